@@ -96,7 +96,7 @@ class BoundsComparison(Result):
         }
 
     def _entry(self, bound: Bound) -> dict[str, Any]:
-        """One condition of the document."""
+        """The entry of one condition in the document, by key and unit."""
         return {
             "name": bound.name,
             "source": bound.source,
@@ -208,7 +208,7 @@ def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
 
 
 def _crossings(chart: StabilityChart, wall_damping: float) -> list[float]:
-    """Stiffnesses at which the edge's samples cross the line of this damping."""
+    """Approximate stiffnesses [N/m] at which the chart's edge crosses one damping [N s/m], between its samples."""
     stiffnesses: list[float] = []
     for arc in chart.boundary:
         off = arc.damping - wall_damping

@@ -120,7 +120,7 @@ def _roots(a: float, b: float, c: float) -> list[float]:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The exact region of one mode on a loop."""
+    """The bound of a loop whose wall moves one mode: the exact region."""
     t, T = case.traits, case.loop.period
     taken = {
         "mode_mass_kg": t.mode_mass,

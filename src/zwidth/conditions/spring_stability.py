@@ -77,7 +77,7 @@ def spring_stable(mass: float, device_damping: float, sampling_period: float) ->
 
 
 def condition(case: ConditionCase) -> Bound:
-    """Spring stability of the bare device on a loop."""
+    """The bound of a loop by the spring stability of its device."""
     m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     device = spring_stable(m, b, T) if isfinite(m) and isfinite(b) else None
     return case.bound(

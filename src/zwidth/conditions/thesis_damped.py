@@ -98,7 +98,7 @@ def printed_tip(device_damping: ArrayLike, mass: ArrayLike, sampling_period: Arr
 
 
 def _printed_tip(x: Floats) -> tuple[Floats, Floats]:
-    """p and d of (4.10), (4.11) at x = b T/m, (...)."""
+    """The numbers p and d of the region's tip, (4.10) and (4.11), at x = b T/m (...)."""
     n1, n0, E, _ = held_force_response(x)
     d = E / (n0 + np.sqrt(n0**2 + n0 * n1 * E))
     return (n1 + n0) * (x + d) * (1.0 - n0 * d) / (n0 * (1.0 + n1 * d)), d
@@ -164,7 +164,7 @@ def tangent_stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """(4.9) with the root z = -1 on a loop."""
+    """The bound (4.9) of a loop, with the root z = -1."""
     m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     return case.bound(
         name="rigid mass with friction",
@@ -181,7 +181,7 @@ def condition(case: ConditionCase) -> Bound:
 
 
 def tangent_condition(case: ConditionCase) -> Bound:
-    """(4.12) on a loop."""
+    """The bound (4.12) of a loop, as conditions are compared."""
     m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     return case.bound(
         name="rigid mass with friction, soft walls",

@@ -132,7 +132,7 @@ def _tip(mass: Floats, stiffness: Floats, period: Floats) -> tuple[Floats, Float
 
 
 def condition(case: ConditionCase) -> Bound:
-    """(4.43) on a loop."""
+    """The bound (4.43) of a loop, as conditions are compared."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     return case.bound(
         name="motor side on a spring",

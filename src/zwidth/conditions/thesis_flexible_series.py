@@ -81,7 +81,7 @@ def linear_stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """(4.47) on a loop."""
+    """The bound (4.47) of a loop, as conditions are compared."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     stiffness, damping = largest(m, k, T)
     return case.bound(
@@ -98,7 +98,7 @@ def condition(case: ConditionCase) -> Bound:
 
 
 def linear_condition(case: ConditionCase) -> Bound:
-    """(4.48) on a loop."""
+    """The bound (4.48) of a loop, as conditions are compared."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     return case.bound(
         name="linear condition on a slow spring",

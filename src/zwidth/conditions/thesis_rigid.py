@@ -57,7 +57,7 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """(4.14) on a loop."""
+    """The bound (4.14) of a loop, as conditions are compared."""
     m, T = case.traits.rigid_mass, case.loop.period
     return case.bound(
         name="rigid mass",

@@ -75,7 +75,7 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """(4.32) on a loop."""
+    """The bound (4.32) of a loop, as conditions are compared."""
     m, T = case.traits.rigid_mass, case.loop.period
     return case.bound(
         name="rigid mass, one sample of delay",

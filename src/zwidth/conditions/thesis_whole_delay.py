@@ -121,7 +121,7 @@ def _bisect(rising: Callable[[Floats], Floats], end: Floats) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """(4.26) on a loop, its delay rounded up to whole samples."""
+    """The bound (4.26) of a loop, its delay rounded up to whole samples."""
     loop = case.loop
     m, T, l = case.traits.rigid_mass, loop.period, loop.whole_delay + (loop.fractional_delay > 0.0)
     stiffness, damping = largest(m, T, l)

@@ -260,7 +260,7 @@ def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
 
 
 def _choices(place: Any, steps: KeyPath) -> list[str]:
-    """The keys or elements there are at a place, sorted."""
+    """The keys that a table, `place`, has or may have, sorted; of a list the names or numbers of its elements."""
     if isinstance(place, list):
         names = [e.get("name") if isinstance(e, dict) else None for e in place]
         return [n if isinstance(n, str) else str(i) for i, n in enumerate(names)]
@@ -268,7 +268,7 @@ def _choices(place: Any, steps: KeyPath) -> list[str]:
 
 
 def _free(steps: list[str | int]) -> bool:
-    """Whether the table here takes keys of any name, as assemblies do."""
+    """Whether the table at a path takes keys of any name, as [mechanism.assemblies] does."""
     return any(
         isinstance(subschema.get("additionalProperties"), dict) for subschema in schema.subschemas(tuple(steps))
     )
@@ -353,7 +353,7 @@ def edited_text(
 
 
 def _carry_over(place: Any, before: Any, after: Any) -> None:
-    """Change in a parsed file, `place`, what differs between its plain values before and after."""
+    """Change in a parsed TOML file, `place`, the values that differ between plain copies before and after."""
     if isinstance(after, dict):
         for key in [key for key in before if key not in after]:
             del place[key]

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 
 
 def controller(loop: LoopSection) -> Controller:
-    """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
+    """The controller of [loop]; a delay in seconds becomes samples, a filter of time constant 0 is left out."""
     period = value_or(loop.sampling_period_s, NOT_KNOWN)
     delay = loop.delay_s / period if loop.delay_s is not None else value_or(loop.delay_samples, 0.0)
     return Controller(
@@ -162,7 +162,7 @@ def plant(
 
 
 def operator(section: OperatorSection) -> Operator:
-    """The arm and its grasp."""
+    """The operator of [operator]: the arm, and the grasp that holds the handle."""
     rigid = section.grasp == "rigid"
     return Operator(
         arm_mass=section.arm_mass_kg,
@@ -182,7 +182,7 @@ def response(section: ResponseSection, label: str, period: float) -> Response:
 
 
 def damping(section: DampingSection | None) -> Damping:
-    """The way of damping; a plant brings its own."""
+    """The damping of [mechanism.damping]: of modes or proportional; else that of the drives' dampers."""
     from zwidth.model.modes import GivenDamping, ModalDamping, ProportionalDamping
 
     if section is None or section.given:
@@ -254,7 +254,7 @@ def nonlinear_kind(path: KeyPath) -> str:
 def nonlinear_of_plant(
     plant: Plant, section: PlantSection, friction: FrictionSection | None, encoder: EncoderSection | None
 ) -> Nonlinear:
-    """What the file says of a given plant: friction along its coordinates, one counter of the sensor's reading."""
+    """What a linear plant leaves out: dry friction, encoder step and noise, nonlinear springs, brakes."""
     one = np.ones(1) if plant.size == 1 else plant.actuator
 
     def along(given: Sequence[float] | None) -> Floats:
@@ -276,7 +276,7 @@ def nonlinear_of_plant(
 
 
 def _friction(section: FrictionSection) -> tuple[Friction, ...]:
-    """One element for each coordinate that has any."""
+    """The dry friction of a given plant: one element for each coordinate that has any."""
     levels = section.coulomb_N
     breakaway = (math.nan,) * len(levels) if section.breakaway_N is None else section.breakaway_N
     return tuple(
@@ -313,7 +313,7 @@ NONLINEAR_NUMBERS: Final = {
 
 
 def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSection) -> DriveNonlinearity | None:
-    """What the file says of a mechanism's drives, at the motor; None where it says nothing."""
+    """Friction and encoder steps of a mechanism's drives (d,), at the motor; None where the file gives neither."""
     nonlinearity = DriveNonlinearity(
         friction_model=friction.model,
         bristle_stiffness=value_or(friction.bristle_stiffness_Nm_per_rad, math.inf),

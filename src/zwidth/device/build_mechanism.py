@@ -92,7 +92,7 @@ class Tree:
 
 
 def mechanism(section: MechanismSection) -> Mechanism:
-    """The mechanism; its numbers may be arrays over designs (`design_batch`)."""
+    """The mechanism of [mechanism], whose numbers may be arrays over designs (`design_batch`)."""
     tree = _tree(members(section, "links"))
     loops, drives = members(section, "loops"), [member.entry for member in members(section, "drives")]
     tables = {drive.joint: _ratio_table(drive) for drive in drives if drive.ratio_table is not None}
@@ -128,7 +128,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
 
 
 def _known_axes(links: Mapping[int, LinkSection]) -> dict[int, Floats]:
-    """Of each link whose inertia is one number, its joint's axis, about which alone it is known."""
+    """Unit axis (3,) by link index, of links whose inertia is known about their joint's axis alone."""
     return {index: _unit(np.array(link.axis)) for index, link in links.items() if _has_one_moment(link)}
 
 
@@ -154,7 +154,7 @@ def arm(section: ArmSection) -> Arm:
 
 
 def joint_entries(joint: str) -> int:
-    """How many joint coordinates a joint of a file has; a fixed one counts as one that does not move."""
+    """Number of joint coordinates of a joint of this kind: 1 for a fixed one, too, which does not move."""
     return len(SINGLE[joint])
 
 
@@ -191,7 +191,8 @@ def _links(tree: Tree, tables: Mapping[str, RatioTable]) -> Links:
     limited = np.isfinite(limits).any()
 
     def spread(numbers: Floats, own: int, where: Flags, otherwise: float | Floats = 0.0) -> Floats:
-        """Rows of the links (..., links, own axes) on those of their coordinates, and others elsewhere."""
+        """Numbers of links (..., links, own axes) as one row for each joint coordinate: at those marked by
+        `where`; at others the value `otherwise`."""
         rows = np.take(numbers, of_link, axis=-1 - own)
         return np.ascontiguousarray(np.where(where.reshape(-1, *(1,) * own), rows, otherwise))
 
@@ -244,7 +245,7 @@ def _has_one_moment(link: LinkSection) -> bool:
 
 
 def _inertia(links: Sequence[LinkSection], given: Mapping[str, Floats], axis: Floats) -> Floats:
-    """(..., links, 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
+    """Inertia (..., links, 3, 3) [kg m²]; a single moment I, about the joint's axis a, becomes I a a^T."""
     whole = 0.5 * given["inertia"] + 0.5 * np.swapaxes(given["inertia"], -1, -2)
     single = np.array([_has_one_moment(link) for link in links])
     if not single.any():
@@ -254,7 +255,7 @@ def _inertia(links: Sequence[LinkSection], given: Mapping[str, Floats], axis: Fl
 
 
 def _names(link: LinkSection) -> list[str]:
-    """A name for each joint coordinate of a link: its own for the body, the last of them."""
+    """Names of a link's joint coordinates: name/1, name/2, ..., and of the last, its body, the link's own."""
     return [*(f"{link.name}/{k}" for k in range(1, joint_entries(link.joint))), link.name]
 
 
@@ -338,7 +339,7 @@ def _coordinates(section: MechanismSection, assembly: AssemblySection, tree: Tre
 
 
 def _listed(value: Any, count: int) -> list[Any]:
-    """One number for each of so many coordinates."""
+    """A value as a list of `count` numbers: a single number is repeated."""
     return list(value) if isinstance(value, tuple) else [value] * count
 
 

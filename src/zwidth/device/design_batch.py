@@ -111,11 +111,11 @@ class DesignBatch:
 
     @property
     def differs(self) -> bool:
-        """Whether any number differs."""
+        """Whether the designs differ in any number."""
         return bool(differing_fields(self.parts, _PARTS))
 
     def __getitem__(self, piece: slice) -> DesignBatch:
-        """Some of the designs."""
+        """The batch of some of the designs, those of a slice."""
         count = len(range(*piece.indices(self.count)))
         if count == self.count:
             return self
@@ -173,7 +173,8 @@ class DesignBatch:
     def _over_workspace(
         self, position: Floats, direction: Any, assembly: str | None, model: str | None
     ) -> tuple[OperatingPoint, Flags]:
-        """Each design by its own roadmap of postures."""
+        """The operating points of all designs over positions, each design following its own roadmap of postures;
+        and marks (P,) of the designs that are to be computed alone."""
         mechanism, alone = cast(Mechanism, self.parts.mechanism), np.zeros(self.count, dtype=bool)
         postures: list[Posture | None] = []
         for p in range(self.count):
@@ -213,7 +214,7 @@ class DesignBatch:
         return self._with_parts(point, len(shape) - 1)
 
     def _with_parts(self, point: OperatingPoint, axes: int) -> OperatingPoint:
-        """A point with the numbers of all designs; it has `axes` axes of a workspace."""
+        """A point with the numbers of all designs on a first axis, before its `axes` axes of a workspace."""
 
         def beside(array: NDArray[Any]) -> NDArray[Any]:
             return array.reshape(self.count, *(1,) * axes, *array.shape[1:])
@@ -262,7 +263,7 @@ def _built_alone(document: dict[str, Any]) -> bool:
 
 
 def _leaves(steps: KeyPath, numbers: Floats) -> Iterator[tuple[KeyPath, Floats]]:
-    """Path and numbers (P,) of each number in a list."""
+    """Path and numbers (P,) of each single number of designs, of an array (P, ...) one for each element."""
     if numbers.ndim == 1:
         yield steps, numbers
         return

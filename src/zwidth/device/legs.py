@@ -39,7 +39,7 @@ class LegMember:
     own: frozenset[str] = frozenset()
 
     def turn_of(self, name: str) -> Floats:
-        """(3, 3) by which what stands in the frame of the link of that name, as the copy has it, is turned."""
+        """Rotation (3, 3) of what the copy gives in a link's frame; none for a link of the copy itself."""
         if not self.angle or name in self.own:
             return np.eye(3)
         from zwidth.model.rotations import rotation_matrix  # names are compared without it, in no time
@@ -117,14 +117,14 @@ def spread_tables(mechanism: dict[str, Any]) -> tuple[dict[str, Any], dict[str, 
 
 
 def written_path(path: KeyPath, paths: Mapping[str, Sequence[KeyPath]]) -> KeyPath:
-    """Where in the file stands what is at a path of the mechanism with its legs spread."""
+    """Path in the file of what is at a path of the mechanism whose legs are written out as copies."""
     if len(path) > 2 and path[0] == "mechanism" and path[1] in GROUPS and isinstance(path[2], int):
         return ("mechanism", *paths[str(path[1])][path[2]], *path[3:])
     return path
 
 
 def _angles(leg: Any) -> list[float]:
-    """By what each copy is turned [rad]; a faulty leg has one."""
+    """Angle by which each copy of a leg is turned [rad]; a faulty leg counts as one copy."""
     angles, count = _get(leg, "angles_rad"), _get(leg, "count")
     if isinstance(angles, list | tuple) and all(map(is_number, angles)):
         return list(angles)

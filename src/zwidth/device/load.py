@@ -381,7 +381,7 @@ def build_device(
 
 
 def _reference_direction(reference: ReferenceSection) -> Floats:
-    """(3,) of any length, or a screw (6,)."""
+    """The rendered direction of a reference: a vector (3,) of any length, or a screw (6,)."""
     if reference.axis is None:
         return np.array(build.in_space(reference.direction or ()), dtype=np.float64)
     direction = None if reference.direction is None else np.array(build.in_space(reference.direction))

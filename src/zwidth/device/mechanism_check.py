@@ -74,7 +74,7 @@ def surplus_drives(mechanism: Mechanism) -> tuple[int, ...]:
 
 
 def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> KeyMessages:
-    """A drive for each degree of freedom that is not declared free, and a mass behind every motion."""
+    """Path and sentence of drives that are missing or too many for the freedom, and of massless motions."""
     angles, rows, motions = _least_free(mech, angles)
     m, freedom, drives = mech.joint.size, motions.shape[1], mech.driven
     if not freedom:
@@ -111,7 +111,7 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
 
 
 def _move_although_held(mechanism: Mechanism, mech: MechanismArrays, rows: Floats) -> list[str]:
-    """The links whose joints can move while the drives and the free joints rest."""
+    """Names of the links that can move while drives and free joints rest, by the loops' rows (m, 3k)."""
     passive = mech.joint.size - mech.driven - mech.free
     motions = null_space(rows[:passive].T)
     if not motions.size:
@@ -136,7 +136,7 @@ def _least_free(mech: MechanismArrays, angles: Floats) -> tuple[Floats, Floats, 
 
 
 def closed_nearby(mech: MechanismArrays, angles: Floats) -> list[Floats]:
-    """Closed joint coordinates (n,), and two near them."""
+    """Joint coordinates (n,) that close the loops, and two more closed ones a small step away from them."""
     random = np.random.default_rng(1)
     unit = np.where(mech.kind == PRISMATIC, mech.size[0], 1.0)
     starts = angles + unit * random.uniform(-NEARBY, NEARBY, (2, len(angles)))
@@ -144,7 +144,7 @@ def closed_nearby(mech: MechanismArrays, angles: Floats) -> list[Floats]:
 
 
 def _moments_left_open(mechanism: Mechanism, mech: MechanismArrays, section: MechanismSection) -> KeyMessages:
-    """A single moment of inertia serves only a link that turns about no other direction."""
+    """Path and sentence of each inertia given by one number, of links that turn about several axes."""
     links = mechanism.links
     order = {name: i for i, name in enumerate(links.names)}
     axis = joint_axes(mechanism, np.zeros(len(links.names)))

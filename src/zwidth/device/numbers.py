@@ -115,7 +115,7 @@ def device_numbers(device: Device) -> tuple[DeviceNumber, ...]:
 
 
 def circumstance(steps: KeyPath) -> str:
-    """Why a number of a device file chooses where the device is and is none of its properties; "" if it is one."""
+    """Why a number of a file only chooses where the device is and is no property of it; empty if it is one."""
     return next((why for head, why in CIRCUMSTANCES.items() if steps[: len(head)] == head), "")
 
 
@@ -151,7 +151,7 @@ def _absent(document: dict[str, Any], given: set[KeyPath]) -> Iterator[tuple[Key
 
 
 def _tables(place: Any, path: KeyPath) -> Iterator[KeyPath]:
-    """Path of every table of a document below the whole."""
+    """Path of every table in a document, but not that of the whole."""
     if isinstance(place, dict | list):
         for step, inner in place.items() if isinstance(place, dict) else enumerate(place):
             if isinstance(inner, dict):
@@ -181,7 +181,7 @@ def _absent_keys(document: dict[str, Any], table: KeyPath) -> Iterator[KeyPath]:
 
 
 def _standing_for_nothing(document: dict[str, Any], steps: KeyPath) -> Iterator[float | str | None]:
-    """The value that says the same as leaving a key out, where it may be set alone; else nothing."""
+    """The value, if there is one, that says the same as leaving a key out, where that key may be set alone."""
     choices, default = _choices(document, steps), schema.default(steps, document)
     tried = [default]
     if choices:
@@ -217,8 +217,8 @@ def _choices(document: dict[str, Any], steps: KeyPath) -> tuple[str, ...]:
 def _brings(
     document: dict[str, Any], steps: KeyPath, choices: tuple[str, ...]
 ) -> dict[str, dict[str, float | str | None]]:
-    """Of each kind that a table may be of, the keys that are its own, those that are missing of usual size; and
-    None for each that it does not read. No entry for a kind that is refused for another reason."""
+    """For each kind of table that a tag may name, what changes with it: keys it needs, with usual values, and None
+    for keys it does not read. A kind that is refused for other reasons is left out."""
     tag, keys = schema.kinds(steps[:-1])
     if steps[-1] != tag:
         return {}
@@ -370,7 +370,7 @@ def number_limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float
 
 
 def _limit(kind: dict[str, Any], ours: str, standard: str) -> float | None:
-    """A limit under its name in JSON Schema, or under pydantic's where another check stands before it."""
+    """A limit in a number's schema, by its name in JSON Schema, `standard`, or in pydantic's, `ours`."""
     value = kind.get(standard, kind.get(ours))
     return None if value is None else float(value)
 
@@ -384,7 +384,7 @@ def typical_size(document: dict[str, Any], steps: KeyPath) -> float:
 
 
 def _of_its_kind(document: dict[str, Any], steps: KeyPath) -> float:
-    """The size that numbers of the same meaning have; 0 where there are none."""
+    """Size of numbers like that at a path: the largest of its key, else the usual one; 0 where unknown."""
     own, period = _key(steps), document.get("loop", {}).get("sampling_period_s", 0.0)
     beside = [abs(v) for path, v in _finite(document) if _key(path) == own and path[0] == steps[0]]
     by_period = {"s": float(period), "Hz": 0.1 / float(period) if period else 0.0}
@@ -403,7 +403,7 @@ def _finite(document: dict[str, Any]) -> Iterator[tuple[KeyPath, float]]:
 
 
 def _from_zero(document: dict[str, Any], steps: KeyPath) -> float:
-    """End of a slider that begins at 0: a few times what is usual, and as far as another number of its unit."""
+    """Upper end of a slider from 0: some times the usual size of the number, or what others of its unit need."""
     if kind := _of_its_kind(document, steps):
         return SPAN * kind
     return max(SPAN * USUAL.get(schema.key_unit(steps), 0.0), _of_its_unit(document, steps)) or SPAN

@@ -131,7 +131,7 @@ def _operator(operator: dict[str, Any]) -> KeyMessages:
 
 
 def _lengths(mechanism: dict[str, Any]) -> KeyMessages:
-    """Lengths and positions, those of the reference and the workspace included."""
+    """Path and sentence of each length or position that looks too large [m], of reference and workspace, too."""
     for path, value in _length_keys(mechanism):
         longest = max((abs(x) for x in _flat(value)), default=0.0)
         if longest > LONGEST:
@@ -156,7 +156,7 @@ def _flat(value: Any) -> list[float]:
 
 
 def _size(mechanism: dict[str, Any]) -> float:
-    """How large the device is: the longest of its lengths, and how far its handle is from the origin [m]."""
+    """Size of the device [m]: the largest of its lengths and its handle's distance from the origin."""
     given = [(path, _flat(value)) for path, value in _length_keys(mechanism) if path[0] != "workspace"]
     sizes = [
         math.hypot(*numbers) if path[-1] != "points_m" or path[0] == "handle" else max(numbers)
@@ -186,7 +186,7 @@ def _angles(mechanism: dict[str, Any]) -> KeyMessages:
 
 
 def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
-    """A mass too large for the device or for its own inertia, an inertia too large for the device."""
+    """Path and sentence of each mass or inertia of a link that looks too large for a device of this size [m]."""
     wrist = table(mechanism, "handle").get("controls") == "orientation"  # which may give no lengths at all
     for path, link in written(mechanism, "links"):
         mass, inertia = float(link.get("mass_kg", 0.0)), _largest_moment(link.get("inertia_kg_m2", 0.0))
@@ -227,7 +227,7 @@ def _least_density(mass: float, gyration: float) -> float:
 
 
 def _inertia_units(inertia: float, mass: float, size: float) -> str:
-    """In which unit the inertia would be that of a body as large as the device."""
+    """A hint of the unit in which an inertia would be that of a mass [kg] as large as the device [m]."""
     for name, unit in UNITS:
         if 0.05 * size < math.sqrt(inertia * unit / mass) < size:
             return f"if it is in {name}, write {inertia * unit:.4g}"
@@ -278,8 +278,8 @@ def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
 
 
 def _response(response: Response) -> KeyMessages:
-    """The mass that the response shows, 1/(w^2 |P|), at the frequencies where it shows most of it; and whether
-    repeated sweeps are copies."""
+    """Path and sentence of an implausible mass that a measured response shows, 1/(w^2 |P|), and of repeated sweeps
+    that are copies."""
     mass = 1.0 / ((2.0 * math.pi * response.frequency) ** 2 * np.maximum(np.abs(response.value), 1e-300))
     shown = float(np.quantile(mass, 0.9))
     if shown < LIGHTEST:
@@ -302,7 +302,7 @@ def _thousandth(value: float, unit: str) -> str:
 
 
 def _length(metres: float) -> str:
-    """A length for people."""
+    """A length given in metres, written for people with a unit that suits its size."""
     return f"{metres:.3g} m" if metres >= 1.0 else f"{1e3 * metres:.3g} mm"
 
 
@@ -349,7 +349,7 @@ def _beam_numbers(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
 
 
 def _mode_faults(device: Device) -> dict[str, tuple[KeyPath, str]]:
-    """Of each link whose modes are too fast, by its name: the key below [beam] and the sentence."""
+    """Key below [beam] and sentence by link name, of beams with a first or kept mode too fast for the loop."""
     mechanism, period = device.mechanism, device.controller.sampling_period
     if mechanism is None or not mechanism.flexible or isinstance(period, NotKnown):
         return {}
@@ -481,7 +481,7 @@ class Unknown:
 
     @property
     def names(self) -> str:
-        """Which of several lack it: "all", or their names."""
+        """Names of the links or drives that lack the number, or the word all."""
         names = [path.split(".")[-2] for path in self.paths]
         return "all" if len(names) == self.count else comma_list(names, 6)
 
@@ -501,7 +501,7 @@ USEFUL: Final = ("stiffness_Nm_per_rad", "encoder_counts_per_rev", "torque_limit
 
 
 def unknown_numbers(document: dict[str, Any]) -> list[Unknown]:
-    """What a valid document leaves out as not known, and what for it is needed; [] for a device without
+    """The numbers that a valid document leaves out as not known, and what needs each; [] for a device without
     [mechanism]."""
     mechanism = table(document, "mechanism")
     if not mechanism:

@@ -90,7 +90,7 @@ def _check_frequencies(path: Path, frequency: Floats, first: Floats, name: str) 
 def _handle(
     paths: Mapping[str, MeasuredPath], *, at_sensor: bool = False, actuator_at_sensor: bool = False
 ) -> MeasuredHandle:
-    """The handle of measured paths by field."""
+    """A `MeasuredHandle` from measured paths by its field names."""
     into, out, own = (paths.get(name) for name in HANDLE_PATHS)
     return MeasuredHandle(into, out, own, at_sensor, actuator_at_sensor)
 
@@ -102,7 +102,7 @@ def _paths_of(handle: MeasuredHandle) -> dict[str, MeasuredPath]:
 
 
 def _mean(responses: Sequence[Response]) -> Response:
-    """Repeated sweeps as one response; a frequency is as coherent as in the worst of them."""
+    """The mean of repeated sweeps; its coherence at each frequency is that of the worst sweep."""
     first = responses[0]
     whole = mean_path([MeasuredPath(response.value, response.coherence) for response in responses])
     note = f"mean of {len(responses)} sweeps" + (f", each {first.note}" if first.note else "")
@@ -251,7 +251,7 @@ def _response_of_record(path: Path, table: Table, section: ResponseSection, peri
 def _record_response(
     path: Path, force: Floats, position: Floats, section: ResponseSection, period: float
 ) -> Response:
-    """A path of a raw sweep. Raises DeviceError."""
+    """The response from a force to a position of a raw sweep, by its samples. Raises DeviceError."""
     try:
         return sweep_response(force, position, period, section.integrators, section.segment_samples)
     except ResponseError as error:
@@ -341,7 +341,7 @@ def _table(path: Path, *, of_handle: bool = False) -> Table:
 
 
 def _columns(path: Path, header: list[str], of_handle: bool) -> list[str]:
-    """The columns to read: those of a response or those of a raw sweep."""
+    """Columns to read by a header: of a response or, with time_s, of a raw sweep. Raises DeviceError."""
     if not header:
         raise fail(str(path), "", f"is empty; its first line must name columns, such as {', '.join(SPECTRUM)}")
     wanted: tuple[str, ...]

@@ -79,7 +79,7 @@ def _long_enough(detail: ErrorDetails) -> bool:
 
 
 def _where(detail: ErrorDetails, document: Any) -> KeyPath:
-    """The location as a path of the document: steps that pydantic adds (tags, lifted numbers) left out."""
+    """Path of pydantic's error in the document, without steps that pydantic adds (tags, lifted numbers)."""
     path: list[str | int] = []
     *outer, last = detail["loc"] or ("",)
     for part in (*outer, last) if detail["type"] != "missing" else outer:
@@ -190,7 +190,7 @@ def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
 
 
 def _in_si(key: str, value: Any, allowed: Collection[str]) -> str:
-    """What to give for a key in another unit: the allowed key and its number; "" where there is none."""
+    """A hint for a key in another unit: the allowed key in SI units and its number; empty where there is none."""
     known = isinstance(value, int | float) and not isinstance(value, bool)
     if re.fullmatch(r"sampl\w*_(?:frequency|rate)(?:_k?Hz)?", key) and "sampling_period_s" in allowed:
         frequency = value * (1e3 if key.endswith("kHz") else 1.0) if known else 0.0
@@ -257,7 +257,7 @@ def without_unsupported(document: dict[str, Any]) -> tuple[dict[str, Any], list[
 def _places(
     document: Any, pattern: tuple[str, ...], path: KeyPath = ()
 ) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Where the last key of the pattern stands: its path and the table that holds it."""
+    """Path of each key that a pattern (* for each list element) leads to, and the table that holds it."""
     first, rest = pattern[0], pattern[1:]
     if first == "*":
         for index, inner in enumerate(document if isinstance(document, list) else []):

@@ -60,7 +60,7 @@ class CubicPieces:
 
     @classmethod
     def through(cls, nodes: Floats, values: Complexes, signs: Floats) -> CubicPieces:
-        """The cubics through values (m, n) at nodes (n,); signs (m,) -1 of odd functions."""
+        """Cubics through values (m, n) at ascending nodes (n,); `signs` (m,) are -1 for odd functions."""
         window = np.arange(len(nodes) - 4)[:, None] + np.arange(5)
         apart = nodes[window][:, :, None] - nodes[window][:, None, :] + np.eye(5)
         fifth = np.abs(np.sum(values[:, window] / np.prod(apart, axis=2), axis=2))
@@ -130,7 +130,7 @@ class Form:
         return np.asarray(own / (np.sqrt(self.radius**2 + self.n0 * own) + self.radius + 1e-300))
 
     def larger(self) -> tuple[Complexes, Floats]:
-        """C/s and (|C|^2 - R^2)/s^2 (k,) of disks that hold all those of these errors."""
+        """C/s and (|C|^2 - R^2)/s^2 (k,) of disks that hold every disk within these errors."""
         taken = np.minimum(self.e0, KEPT * self.n0)
         t = np.minimum(1.0 / self.nearest, KEPT * self.n0 / self.e1)
         own = self.n0 - taken - t * self.e1
@@ -186,11 +186,11 @@ class DisksBetween:
         return C, X
 
     def _by_forms(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
-        """C/s and (|C|^2 - R^2)/s^2 (n,) by n0, n1, n2."""
+        """C/s and (|C|^2 - R^2)/s^2 (n,) at angles, interpolating the numbers n0, n1, n2 of a `Form`."""
         return Form.at(self.forms[kind - CENTRES], angles).larger()
 
     def _by_centres(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
-        """C/s and (|C|^2 - R^2)/s^2 (n,) by C itself, its inverse or its logarithm."""
+        """C/s and (|C|^2 - R^2)/s^2 (n,) at angles, interpolating C/s (kind 0), s/C (1) or log(C/s) (2)."""
         values, errors = self.centres.at(angles)
         C, error = _centre(values[kind], errors[kind], kind)
         (ratio,), (missed,) = self.ratio.at(angles)
@@ -199,7 +199,7 @@ class DisksBetween:
 
 
 def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floats]:
-    """C/s (n,) and its relative error from what was interpolated."""
+    """C/s (n,) and its relative error, from interpolated C/s (kind 0), s/C (1) or log(C/s) (2)."""
     if kind == 2:
         return np.exp(value), np.expm1(np.minimum(error, MOST))
     share = error / np.maximum(np.abs(value), 1e-300)
@@ -230,7 +230,7 @@ def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
 
 
 def _disks_through(disks: Disks, nodes: Ints, scale: float, below: DisksBetween | None) -> DisksBetween:
-    """The disks between those at some of the measured angles (k,)."""
+    """The interpolation of disks over angles, by those numbered `nodes`, of measured ones scaled by `scale`."""
     theta, C = disks.angles[nodes], disks.centre[nodes] / scale
     R, X = disks.radius[nodes] / scale, disks.power[nodes] / scale**2
     x, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C.real, C.imag, X])

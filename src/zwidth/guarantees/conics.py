@@ -119,7 +119,7 @@ def conics_of_disks(
 
 
 def _panel_nodes() -> Floats:
-    """Points of a panel as shares of its width."""
+    """Points of a panel in log(angle) at which functions are sampled, as shares of its width."""
     return np.asarray((1.0 + chebyshev.chebpts2(POINTS)) / 2.0)
 
 

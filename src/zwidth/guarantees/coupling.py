@@ -114,13 +114,13 @@ def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None)
 
 
 def no_couplings(reason: str = NO_HANDLE) -> Couplings:
-    """The result where no coupling is known, and the reason."""
+    """The result with empty regions, and the reason why no coupling is known."""
     none = empty_region(reason)
     return Couplings(none, none, none, None, reason)
 
 
 def coupling_angles(loop: Loop, held: Floats) -> Floats:
-    """Angles in (0, pi), ascending; the last lies just below pi, at which Tustin's hold passes nothing."""
+    """Ascending angles w T in (0, pi) of a demand; the last is just below pi, where Tustin's hold is 0."""
     angles = angle_grid(loop, held)
     even = np.linspace(0.0, np.pi, 2001)[1:]
     return np.minimum(np.union1d(angles, even), np.pi * (1.0 - 1e-9))
@@ -168,7 +168,8 @@ def _excludes_springs(demand: CouplingDemand) -> bool:
 
 
 def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
-    """The direction of the largest k_c with b_c >= 0, by golden section round a sampled one."""
+    """The direction, an angle from k_c T to b_c, of the ray with the largest k_c among those with b_c >= 0: golden
+    section round `near`; of equal ones the least damped."""
     step = np.pi / (DIRECTIONS - 1)
     low, high = max(near - step, 0.0), min(near + step, np.pi / 2.0)
     ratio = (np.sqrt(5.0) - 1.0) / 2.0

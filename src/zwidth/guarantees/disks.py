@@ -83,7 +83,7 @@ class Aliases:
 
     @classmethod
     def of(cls, loop: Loop, held: Port) -> Aliases:
-        """The sums of a loop held at a port."""
+        """The aliases' sums of a loop, its plant held at a port."""
         near, far = _ranges(loop, held)
         expansion = _expansion(loop, held, far)
         for _ in range(MOVES):
@@ -158,12 +158,12 @@ def _power(p: Complexes, q: Complexes, c: Complexes, r: Floats) -> Floats:
 
 
 def one_less_z_inverse(theta: Floats) -> Complexes:
-    """1 - e^(-i theta) without cancellation."""
+    """1 - 1/z at z = e^(i theta), (k,), without cancellation near theta = 0."""
     return np.asarray(2j * np.sin(theta / 2.0) * np.exp(-0.5j * theta), dtype=complex)
 
 
 def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
-    """The discrete filter of the whole force."""
+    """Response of the discrete filter of the whole force at angles theta = w T, (k,)."""
     top, bottom = low_pass_factors(loop.controller.force_filter, loop.period)
     d = np.exp(1j * theta) * one_less_z_inverse(theta)
     return np.asarray(
@@ -187,7 +187,7 @@ def _terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes, Comp
 
 
 def _ranges(loop: Loop, held_port: Port) -> tuple[int, int]:
-    """Aliases summed one by one, and where the expansion begins: beyond the poles in their units 2 pi/T."""
+    """Number of aliases summed one by one, and that at which the expansion begins, beyond all poles."""
     lag = loop.controller.actuator_time_constant
     poles = np.append(held_port.poles, -1.0 / lag if lag > 0.0 else 0.0) * loop.period / (2.0 * np.pi)
     # a pole further than six turns from the frequency axis bends nothing that the nodes could miss
@@ -229,7 +229,7 @@ def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
 
 
 def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complexes, Floats]:
-    """Sum over k > far of the terms at x + k, x (m,) in (-1/2, 1/2), term by term of the expansion."""
+    """Sums of centres and of radii (m,) over aliases x + k, k > far, x (m,) in (-1/2, 1/2), by expansion."""
     if not expansion.misfit < FALLS:
         return np.zeros(len(x), dtype=complex), np.full(len(x), np.inf)
     first = expansion.far + 1

@@ -94,7 +94,7 @@ def _touches(own: CircleFactors, beside: CircleFactors, first: float, last: floa
 def touching_points(
     springs: SpringFamily, share: float, first: float, last: float, pieces: int = PIECES
 ) -> list[TouchingPoint]:
-    """All touching points of a spring between two angles."""
+    """All touching points of the spring of a share between two angles."""
     pair = springs.neighbour_pair(share)
     if pair is None:
         return []
@@ -167,18 +167,18 @@ def envelope_between(
 
 
 def _goes_ahead(walk: Floats) -> bool:
-    """Whether no step of a walk (k, 2) turns back on the one before."""
+    """Whether no step of a walk, points (k, 2), goes back against the step before."""
     steps = np.diff(walk, axis=0)
     return bool(np.all(np.sum(steps[1:] * steps[:-1], axis=1) >= 0.0))
 
 
 def _way(one: TouchingPoint, other: TouchingPoint) -> int:
-    """1 if the stable side is on the left from one to the other, -1 if on the right."""
+    """1 if the stable side is on the left when going from one touching point to the other, -1 if on the right."""
     return 1 if float((other.wall - one.wall) @ one.tangent) >= 0.0 else -1
 
 
 def _cubic(one: TouchingPoint, other: TouchingPoint, size: float) -> Floats | None:
-    """The cubic over the chord of two touching points with their tangents, as points; None if it is steep."""
+    """Points (k, 2) of the cubic between two touching points, along their tangents; None where it is too steep."""
     gap = other.wall - one.wall
     length = float(np.hypot(*gap))
     if length == 0.0:
@@ -244,7 +244,7 @@ class EnvelopeCuts:
         return shapely.difference(shape, shapely.union_all(self.strips))
 
     def _touching(self, share: float) -> list[TouchingPoint]:
-        """Touching points on the edge of one spring's chart."""
+        """Touching points on the edge of the chart with one spring, given by its share."""
         member, points = self.springs.member(share), []
         for arc in member.edge.arcs if member else ():
             if arc.curved:
@@ -254,7 +254,7 @@ class EnvelopeCuts:
     def _neighbours(
         self, binding: set[float], shares: Floats, shape: shapely.Geometry, near: float
     ) -> Iterator[tuple[TouchingPoint, TouchingPoint]]:
-        """Touching points of neighbouring springs on one envelope, each pair once."""
+        """Pairs of touching points of neighbouring springs that lie on one envelope near `shape`, each once."""
         for share in sorted(binding):
             at = int(np.searchsorted(shares, share))
             for touch in self.touching_points[share]:

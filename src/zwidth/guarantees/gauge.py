@@ -63,7 +63,7 @@ class Gauge:
 
 
 def gauge(loop: Loop, held: Floats) -> Gauge:
-    """The gauge of a loop held along `held` (n,)."""
+    """The gauge of a loop that an operator holds along the coordinate `held` (n,)."""
     return Gauge(conics(loop, held), static_compliances(loop.plant, held))
 
 
@@ -110,7 +110,7 @@ def _state(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[flo
 
 @compiled
 def _sag(x2: float, x3: float, x4: float, s: float, h: float) -> float:
-    """How far a quartic can lie below its chord from s - h/2 to s + h/2."""
+    """Largest distance of a quartic below its chord from s - h/2 to s + h/2, by coefficients x2, x3, x4."""
     bend = 2.0 * x2 + 6.0 * x3 * s + 12.0 * x4 * s * s
     sag: float = max(bend + 0.5 * h * (abs(6.0 * x3) + abs(24.0 * x4)), 0.0) * h * h / 8.0
     return sag

@@ -61,7 +61,7 @@ class Guarantees(Result):
 
     @property
     def refusal(self) -> str | None:
-        """Why guarantees are withheld; None where no premise of theirs fails."""
+        """The reason why guarantees are withheld: the premise that fails; None where none does."""
         return next((premise.reason for premise in self.premises if premise.fails), None)
 
     @property

@@ -137,7 +137,7 @@ def _spring_guarantees(
 
 
 def _stable(chart: StabilityChart) -> Region:
-    """The walls that are stable with the device as described."""
+    """The chart's walls, stable with the device as described, as a region."""
     peak = chart.stiffness_max
     return Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
 
@@ -198,8 +198,8 @@ def _check_wall(wall: object) -> None:
 
 
 def _of_springs(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
-    """A region made of charts with springs at the handle; empty where there is no handle or a force sensor reads
-    these springs, and, as undecided, where one of the charts cannot be closed."""
+    """The region that `find_region` makes of charts with springs at the handle; empty, with the reason, where
+    there is no handle, a force sensor reads these springs, or a chart cannot be closed."""
     if loop.plant.handle is None:
         return empty_region(NO_HANDLE)
     sensor = loop.controller.force_sensor
@@ -212,7 +212,7 @@ def _of_springs(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
 
 
 def region_of(rings: Sequence[Floats]) -> Region:
-    """Rings of a robust chart as a region."""
+    """The region of rings of walls [K, B] from a robust chart."""
     K, B = stiffest_corner(rings)
     return Region(tuple(rings), K, B, None if K > 0.0 else NO_STABLE)
 

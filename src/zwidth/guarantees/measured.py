@@ -70,7 +70,7 @@ def measured_disks(port: MeasuredPort, passed: Complexes) -> tuple[Disks, Flags]
 
 
 def _own(port: MeasuredPort, name: str) -> Complexes:
-    """What was measured for a path: itself, or what it stems from."""
+    """Samples of a path's measured response: those of the path itself, or of the path that it was derived from."""
     source = port.origin[name]
     return port.sampled[source] if source in port.sampled else port.baseband[source]
 

@@ -69,7 +69,7 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
 
 
 def passive_region_of(passive_gauge: Gauge, period: float) -> Region:
-    """The walls below 1 by a gauge, with a sampling period [s]."""
+    """The walls whose mu by a gauge is below 1: stable with every passive operator. period: sampling [s]."""
     directions, ends = _outline(passive_gauge, period)
     if not np.any(ends):
         return empty_region(NOTHING)
@@ -167,7 +167,7 @@ def _off_chord(between: Complexes, first: Complexes, last: Complexes) -> Flags:
 
 
 def _stiffest(loop_gauge: Gauge, period: float, low: float, high: float) -> tuple[float, float]:
-    """The largest K between two directions and its B."""
+    """The largest K [N/m] among ray ends between two directions, and its B [N s/m]."""
     top = np.array([_golden(loop_gauge, period, low, high)])
     K, B = _walls(top, 1.0 / _mu(loop_gauge, top, period), period)
     return float(K[0]), float(B[0])

@@ -48,7 +48,7 @@ class Port:
 
     @property
     def poles(self) -> Complexes:
-        """All poles s [1/s], conjugates included."""
+        """All poles s [1/s] of the free plant, conjugates included."""
         return np.asarray(np.linalg.eigvals(self.generator), dtype=complex)
 
     @property
@@ -77,7 +77,7 @@ class Port:
 
 
 def port(plant: Plant, held: Floats) -> Port:
-    """The plant held along `held` (n,)."""
+    """The modes of a plant and its port, at which an operator holds the coordinate `held` . x, held (n,)."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     damping = modal_damping(plant, shapes)
     lagged = tuple(replace(damper, along=shapes.T @ damper.along) for damper in plant.lagged_dampers)

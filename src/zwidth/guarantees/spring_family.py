@@ -78,7 +78,7 @@ class SpringFamily:
 
     @cached_property
     def unit(self) -> float:
-        """Time [s] by which K is multiplied, so that K unit and B have similar size in distances."""
+        """Time [s] that K is multiplied by, so that K unit and B [N s/m] have similar size in distances."""
         T = self.loop.period
         shapes = [member_polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
         left, low, right, high = shapely.intersection_all(shapes).bounds if shapes else (np.nan,) * 4
@@ -100,7 +100,7 @@ class SpringFamily:
         return self._tracers[share]
 
     def _trace(self, share: float) -> Tracer | None:
-        """`tracer`, computed anew."""
+        """The tracer of the loop with the spring of a share s, not taken from those kept; None as `tracer`."""
         plant = with_spring(self.loop.plant, self.stiffness(share))
         if plant.size == 0:
             return None

@@ -147,7 +147,7 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
 
 
 def _region(rings: tuple[Floats, ...], unit: float, reason: str) -> Region:
-    """Rings of [K unit, B] as a region."""
+    """Rings of walls [K unit, B] as a region; `reason` is why it is empty if it is."""
     walls = tuple(ring / (unit, 1.0) for ring in rings)
     K, B = stiffest_corner(walls)
     return Region(walls, K, B, None if K > 0.0 else reason)
@@ -187,7 +187,7 @@ def _alternating(springs: SpringFamily) -> Floats:
 
 
 def _distance(springs: SpringFamily, share: float) -> float:
-    """Stiffness at which a root comes to -1 without damping, |1/P(-1)| [N/m]."""
+    """Stiffness |1/P(-1)| of the undamped wall with a root at z = -1 [N/m], with the spring of a share."""
     tracer = springs.tracer(share)
     a, s, _ = (1.0, 0.0, 0.0) if tracer is None else tracer.line("minus")
     return abs(float(a / s)) if s else FAR
@@ -202,7 +202,7 @@ def _spread(shares: Floats) -> Floats:
 
 
 def _common_shape(springs: SpringFamily, new: Floats, members: dict[float, Member]) -> shapely.Geometry:
-    """What the charts of all springs have in common [K unit, B]; the new ones join the members."""
+    """The walls [K unit, B] inside the charts of all `members` and of `new` springs, which join the members."""
     unit = springs.unit
     left = None if not members else shapely.intersection_all([member_polygons(m, unit) for m in members.values()])
     for share in new.tolist():
@@ -257,7 +257,7 @@ def _cells_and_failing(
 
 
 def _walls(cell: shapely.Polygon, depth: float) -> Floats:
-    """Walls so far inside the edge of a cell, and one in its middle (k, 2)."""
+    """Walls (k, 2) of a cell [K unit, B]: one in its middle, then corners at a depth inside its edge."""
     inner = polygons_of(cell.buffer(-depth, join_style="mitre"))
     middle = np.array(cell.representative_point().coords)
     return np.vstack([middle, *(_spread_corners(np.asarray(part.exterior.coords)) for part in inner)])

@@ -54,7 +54,7 @@ class Premise(Documented):
 
     @property
     def fails(self) -> bool:
-        """Whether it is known not to hold."""
+        """Whether the premise is known not to hold."""
         return self.holds is False
 
 
@@ -131,7 +131,7 @@ def _eigenvalues(matrix: Floats) -> tuple[Any, Floats]:
 
 
 def _verdict(holds: bool | None, rate: float = 0.0) -> Premise:
-    """The premise, with the rate of growth [1/s] where it does not hold."""
+    """The premise that `holds` (None: undecided), with the rate of growth [1/s] where it does not."""
     reason = ""
     if holds is None:
         reason = (

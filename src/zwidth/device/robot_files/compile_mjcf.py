@@ -89,7 +89,7 @@ def compile_mjcf(label: str, parse: Callable[[Any], Any]) -> Compiled:
 
 
 def _refused(error: str) -> str:
-    """What MuJoCo says, on one line."""
+    """The message, on one line, that MuJoCo cannot read the file, with its reason."""
     text = " ".join(error.split())
     text = re.sub(r"^(XML )?Error: ", "", text)
     return f"MuJoCo cannot read it: {text[:1].lower() + text[1:]}"
@@ -155,7 +155,7 @@ def _moving(spec: Any) -> Iterator[Any]:
 
 
 def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
-    """Nothing that only is seen is read from other files, which may be missing and take long."""
+    """Replace meshes by small spheres and remove materials of a model, so that no other file is read."""
     for geom in spec.geoms:
         if _meshed(mujoco, geom) or geom.hfieldname:
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, [0.01, 0.01, 0.01]
@@ -202,7 +202,7 @@ def _possible_moments(spec: Any, label: str) -> list[Finding]:
 
 
 def matrix_of_six(six: Any) -> Any:
-    """Matrix of Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    """Symmetric inertia matrix (3, 3) of Ixx, Iyy, Izz, Ixy, Ixz, Iyz, as MuJoCo orders them."""
     xx, yy, zz, xy, xz, yz = six
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -233,17 +233,17 @@ def _compile(spec: Any, made: Compiled, label: str) -> Any:
 
 
 def _weigh(body: Any, names: set[str]) -> None:
-    """A mass for the compiler alone."""
+    """Give a body a mass, without which MuJoCo does not compile it, and add its name to `names`."""
     names.add(body.name)
     body.explicitinertial, body.mass, body.inertia = True, 1.0, [1.0, 1.0, 1.0]
     body.fullinertia = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 
 def mjcf_file(path: Path) -> Callable[[Any], Any]:
-    """How MuJoCo reads this file, and those that it includes."""
+    """A function that, given the package mujoco, reads this file, and those that it includes, as a MjSpec."""
     return lambda mujoco: mujoco.MjSpec.from_file(str(path))
 
 
 def xml_text(text: str) -> Callable[[Any], Any]:
-    """How MuJoCo reads this text."""
+    """A function that, given the package mujoco, reads this text as a MjSpec."""
     return lambda mujoco: mujoco.MjSpec.from_string(text)

@@ -172,7 +172,7 @@ def _motors(robot: Robot, fixed: frozenset[str]) -> list[Motor] | None:
 
 
 def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkTree, FreeMotions]:
-    """The links with this shape, and how they move."""
+    """The tree of links with a shape (which joints are held or split), and the free motions of the mechanism."""
     tree = link_tree(robot, shape)
     single = next((link["name"] for link in tree.links if link["joint"] in ("revolute", "prismatic")), None)
     if single is None:
@@ -185,7 +185,7 @@ def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkT
 def section_of(
     robot: Robot, tree: LinkTree, handle: tuple[int, Place], controls: str, drives: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """[mechanism], its reference not yet computed."""
+    """The table [mechanism] of a device file, without numbers of the reference position."""
     link, place = tree.in_link(*handle)
     angles = roll_pitch_yaw_of(place.turn)
     held: dict[str, Any] = {"link": link, "point_m": listed(place.at)}
@@ -208,7 +208,7 @@ def section_of(
 
 
 def _leave_out_fixed_loops(robot: Robot, shape: Shape) -> None:
-    """Leave out what joins two bodies that are one link."""
+    """Remove from the robot the loop closures that join two bodies of one link."""
     frames = link_tree(robot, shape).frames
     for closure in list(robot.closures):
         a, b = closure.bodies
@@ -218,7 +218,7 @@ def _leave_out_fixed_loops(robot: Robot, shape: Shape) -> None:
 
 
 def closure_tables(robot: Robot, tree: LinkTree) -> list[dict[str, Any]]:
-    """The loops, in the frames of the links."""
+    """The [[mechanism.loops]] of a robot's closures, with points and axes in the frames of the links."""
     tables, taken = [], LinkTree()
     for closure in robot.closures:
         (link_a, frame_a), (link_b, frame_b) = (tree.frames[body] for body in closure.bodies)
@@ -259,7 +259,7 @@ def _check_loops(robot: Robot, motions: FreeMotions) -> None:
 
 
 def _assumed(robot: Robot, tree: LinkTree, motions: FreeMotions) -> list[Motor]:
-    """As many driven joints as the loops leave freedom, those next to the base first."""
+    """Motors of joints taken to be driven where the file names none: as many as motions are free, base first."""
     followers = {one.joint for one in robot.followers}
     singles = [
         name
@@ -328,7 +328,7 @@ def _size(left: Floats, rows: Sequence[int]) -> float:
 
 
 def _looped(robot: Robot) -> set[int]:
-    """Bodies between the ends of a loop and their fork."""
+    """Indices of the bodies in loops: those on one only of the ways from a closure's two bodies to the base."""
     found: set[int] = set()
     for closure in robot.closures:
         one, two = (robot.way_to_base(body) for body in closure.bodies)
@@ -349,18 +349,18 @@ def _spins(motions: FreeMotions, tree: LinkTree, joints: dict[str, Any], name: s
 
 
 def _only_direction(rows: Floats) -> Floats:
-    """Unit vector (3,) along the largest motion of a ball joint, (3, f)."""
+    """Unit axis (3,) about which a ball joint turns most, from its rows (3, f) of the free motions."""
     return np.asarray(np.linalg.svd(rows)[0][:, 0])
 
 
 def _without(left: Floats, row: Floats) -> Floats:
-    """The motions in which this combination of coordinates rests."""
+    """The motions (m, f - 1), of `left` (m, f), in which their combination `row` (f,) is 0."""
     _, _, right = np.linalg.svd(row[None])
     return np.asarray(left @ right[1:].T)
 
 
 def _axes_along(axis: Floats) -> Floats:
-    """Axes (3, 3) of which the first is the given one, the nearer way round."""
+    """Rotation (3, 3) whose first column is along an axis, its largest component made positive."""
     x = axis if axis[np.argmax(np.abs(axis))] > 0.0 else -axis
     x = np.where(np.abs(x) < 1e-12, 0.0, x)
     x = x / np.linalg.norm(x)
@@ -379,7 +379,7 @@ def _controls(
     shape: Shape,
     wanted: str | None,
 ) -> tuple[str, Floats]:
-    """What of the handle the drives control, and their motions of it (6, d) at the reference posture."""
+    """What the drives control of the handle (position, ...), and its motions (6, d) by them at reference."""
     if not kept:
         raise fail(robot.label, "", _nothing_moves(robot, motions))
     free = [row for name in sorted(shape.free) for row in _free_rows(robot, tree, motions, name)]
@@ -405,7 +405,7 @@ def _controls(
 
 
 def _nothing_moves(robot: Robot, motions: FreeMotions) -> str:
-    """Why no drive moves anything."""
+    """The message for drives that move no joint, or for loops that leave no freedom."""
     if motions.basis.shape[1]:
         return "drives no joint that moves; name a motor for each degree of freedom"
     names = comma_list([f"'{closure.name}'" for closure in robot.closures], 6)
@@ -486,19 +486,19 @@ class FreeMotions:
         return min((place.basis for place in self.places), key=lambda basis: basis.shape[1])
 
     def rows(self, link: str) -> list[int]:
-        """The coordinates of a link's joint."""
+        """Indices of the joint coordinates of a link's joint."""
         own = {link, *(f"{link}/{k}" for k in range(1, 6))}
         return sorted((u for u, name in enumerate(self.entries) if name in own), key=lambda u: self.order[u])
 
     @property
     def order(self) -> list[int]:
-        """The number of each coordinate's entry among those of its joint; the last has the largest."""
+        """Of each coordinate its number within its joint, from 1; the last, named as the link, counts as 6."""
         numbers = (name.partition("/")[2] for name in self.entries)
         return [int(number) if number else 6 for number in numbers]
 
     @property
     def open_loops(self) -> list[int]:
-        """Indices of the loops that do not close."""
+        """Indices of the loops that do not close at the reference posture."""
         return [k for k, gap in enumerate(self.gaps) if gap > CLOSED * self.size]
 
 
@@ -534,7 +534,7 @@ def _configuration(mech: MechanismArrays, angles: Floats) -> Configuration:
 
 
 def independent(basis: Floats, groups: Iterable[Sequence[int]], kept: Sequence[int] = ()) -> list[int]:
-    """Which groups of rows of a basis, each with those before it, are independent of the rows kept so far."""
+    """Indices of groups of rows of `basis` (m, f) that are independent of `kept` rows and earlier groups."""
     chosen, rows = [], list(kept)
     for k, group in enumerate(groups):
         if _rank(basis[[*rows, *group]]) == len(rows) + len(group):
@@ -544,7 +544,7 @@ def independent(basis: Floats, groups: Iterable[Sequence[int]], kept: Sequence[i
 
 
 def left_over(basis: Floats, rows: Sequence[int]) -> Floats:
-    """The motions (m, f') in which these coordinates rest."""
+    """Combinations (m, f') of the free motions `basis` (m, f) in which the coordinates of these rows rest."""
     if not rows or not basis.size:
         return basis
     _, values, right = np.linalg.svd(basis[list(rows)])
@@ -580,7 +580,7 @@ def controlled(part: Floats) -> bool:
 
 
 def idle_drives(H: Floats) -> list[int]:
-    """The drives that do not move the handle at all."""
+    """Indices of the drives that do not move the handle, columns of its motions H (6, d)."""
     sizes = np.abs(H).max(axis=0)
     return [
         int(k) for k in np.flatnonzero(sizes <= NEGLIGIBLE * max(sizes.max(initial=0.0), np.finfo(float).tiny))

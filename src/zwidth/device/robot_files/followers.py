@@ -40,7 +40,7 @@ ALIGNED: Final = 1e-9  # sine of the angle between axes that count as parallel, 
 
 
 def settle_followers(robot: Robot) -> None:
-    """Put every follower where its leader takes it."""
+    """Set the coordinate of every joint that follows another to what its leader's coordinate asks for."""
     for _ in robot.followers:
         for one in robot.followers:
             joints = robot.joints
@@ -74,7 +74,7 @@ def _refusal(one: Follower) -> str:
 
 
 def _on_leader(robot: Robot, motor: Motor) -> Motor:
-    """A motor whose turns are told by joints that follow no other."""
+    """The motor with turns expressed by joints that follow no other, in place of those that do."""
     leaders = {one.joint: (one.leader, one.ratio) for one in robot.followers}
     turns, joint = dict(motor.turns), motor.joint
     for _ in leaders:
@@ -108,8 +108,8 @@ def _linked(robot: Robot, one: Follower) -> bool:
 
 
 def _anchored(robot: Robot, body: int) -> tuple[int, Place]:
-    """The body that carries this one without a joint between, the farthest such, and the place of this one in
-    it."""
+    """The body that carries a body by fixed connections alone, the nearest to the base, and the place of the
+    latter in it."""
     place = UNMOVED
     while body != BASE and not robot.bodies[body].joints:
         place = robot.bodies[body].place @ place
@@ -118,7 +118,7 @@ def _anchored(robot: Robot, body: int) -> tuple[int, Place]:
 
 
 def _carrier(robot: Robot, body: int) -> tuple[int, Place]:
-    """What a body's joint turns or slides against, and where the body stands in it at coordinate 0."""
+    """The body against which a body's joint moves, and the place of the latter in it with the joint at 0."""
     carrier, place = _anchored(robot, robot.bodies[body].parent)
     return carrier, place @ robot.bodies[body].place
 
@@ -145,7 +145,7 @@ def _slide_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
 
 
 def _slide(robot: Robot, name: str, on: int, place: Place, direction: Floats, way: float = 0.0) -> int:
-    """Add a body without mass that slides on another, by so many lengths of the direction; its index."""
+    """Add a massless body that slides on body `on` by `way` lengths of the direction; returns its index."""
     length = float(np.linalg.norm(direction))
     axis = place.turn.T @ direction / length
     joint = RobotJoint(name, "prismatic", axis, np.zeros(3), way * length)
@@ -156,7 +156,7 @@ def _slide(robot: Robot, name: str, on: int, place: Place, direction: Floats, wa
 def _wedge(
     robot: Robot, name: str, on: tuple[int, Place], to: tuple[int, Place], direction: Floats, way: float
 ) -> None:
-    """Add a body that slides on one body, along a direction of what carries both, and stays on another."""
+    """Add a massless body that slides on body `on` along a direction, and that a loop pins to body `to`."""
     carrying, place = on
     wedge = _slide(robot, name, carrying, UNMOVED, place.turn.T @ direction, way)
     met = to[1].inverse.of_point(place.at)
@@ -197,7 +197,8 @@ def _turn_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
 def _keep_orientation(
     robot: Robot, name: str, keeps: tuple[int, Place], kept: tuple[int, Place], axis: Floats
 ) -> None:
-    """Let one body move across an axis against another, and not turn; both places are in a common frame."""
+    """Add massless slides and a loop by which body `kept` moves across an axis against body `keeps` but does not
+    turn; both places are in one frame."""
     relative = keeps[1].inverse @ kept[1]
     u = keeps[1].turn.T @ axis
     e = np.cross(u, np.eye(3)[int(np.argmin(np.abs(u)))])

@@ -120,7 +120,7 @@ def merged_tables(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def _put_joints(robot: Robot, posture: Mapping[str, float]) -> None:
-    """Put joints of one coordinate where the user wants them. Raises DeviceError for others."""
+    """Set coordinates of joints of one coordinate [rad] or [m], by name. Raises DeviceError for other names."""
     singles = {name for name, (_, joint) in robot.joints.items() if joint.single}
     faults = [
         Fault(
@@ -153,7 +153,7 @@ def _read_mjcf(path: Path, name: str, label: str, keyframe: str | None) -> Robot
 
 
 def _tell_of_decisions(robot: Robot, decided: Any) -> None:
-    """Findings about names, masses, driven and free joints."""
+    """Add findings to the robot about names changed, masses unknown, joints taken as driven or free."""
     for wanted, made in decided.tree.renamed.items():
         robot.note(f"'{wanted}'", f"is called '{made}' in the device file")
     if decided.assumed:
@@ -317,7 +317,7 @@ SETTLED = 1e-9  # of joint coordinates that closing the loops does not change [r
 
 
 def document_of(robot: Robot, decided: Decided, source: str) -> dict[str, Any]:
-    """All tables of the device file."""
+    """The device file of an imported robot as a document: name, source, mechanism and an empty loop."""
     names = LinkTree()
     drives = _drives(robot, decided, names)
     section = section_of(robot, decided.tree, decided.handle, decided.controls, drives)
@@ -362,8 +362,8 @@ def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, A
 
 
 def _rotor(robot: Robot, motor: Motor) -> float:
-    """Inertia of the rotor at the motor: its own, and the armature of the joint that it drives alone, and of those
-    that follow this, over the square of the ratio."""
+    """Inertia of the rotor at the motor [kg m²]: its own, and, if it drives one joint, over the square of the
+    ratio the armature of this joint and of those that follow it."""
     own = float(motor.inertia or 0.0)
     if len(motor.turns) != 1:
         return own
@@ -373,7 +373,7 @@ def _rotor(robot: Robot, motor: Motor) -> float:
 
 
 def _torque(robot: Robot, motor: Motor) -> float | None:
-    """Largest torque at the motor: its own, or what its joint bears."""
+    """Largest torque of a motor [N m]: its own, or from the effort of its joint; None if not known."""
     if motor.torque is not None or not motor.turns:
         return motor.torque
     effort = robot.joints[motor.joint][1].effort
@@ -394,7 +394,7 @@ def _tell_of_armature(robot: Robot, decided: Decided) -> None:
 
 
 def _close(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
-    """The assembly's coordinates where the loops are closed."""
+    """Write into `section` the joint coordinates at which the loops close, where those of its assembly do not."""
     mechanism, angles = decided.motions.mechanism, decided.motions.angles
     (started,) = mechanism.assemblies.values()
     if np.abs(angles - started).max(initial=0.0) <= SETTLED:
@@ -414,7 +414,7 @@ def _close(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
 
 
 def _direction(robot: Robot, decided: Decided) -> list[float]:
-    """The axis of the base along which the drives move the handle most."""
+    """Direction (3,) of a base axis along which the drives move the handle most."""
     sizes = np.linalg.norm(decided.columns[:3], axis=1)
     axis = int(np.argmax(np.round(sizes / max(sizes.max(), np.finfo(float).tiny), 6)))
     robot.note(

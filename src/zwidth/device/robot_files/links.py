@@ -67,13 +67,13 @@ class LinkTree:
         return made
 
     def in_link(self, body: int, place: Place) -> tuple[str, Place]:
-        """The link of a body, and a place of the body in that link's frame."""
+        """Name of the link that holds a body, and a place given in the body's frame, in the link's frame."""
         link, frame = self.frames[body]
         return link, frame @ place
 
 
 def link_tree(robot: Robot, shape: Shape) -> LinkTree:
-    """The links of a robot."""
+    """The robot's bodies as a device file's links; `shape` says which joints are held, split or free."""
     tree = LinkTree()
     moving = moving_bodies(robot, shape.fixed)
     tree.masses_known = any((robot.bodies[i].mass or 0.0) > 0.0 for i in moving)
@@ -100,7 +100,7 @@ def moving_bodies(robot: Robot, fixed: frozenset[str]) -> set[int]:
 
 
 def _held(body: RobotBody) -> Place:
-    """Where joints that are all held take the body's frame."""
+    """Place of a body's frame, in that frame at coordinates 0, which its joints give it where all are held."""
     place = UNMOVED
     for joint in body.joints:
         place = place @ joint_motion(joint, joint.value)
@@ -108,7 +108,7 @@ def _held(body: RobotBody) -> Place:
 
 
 def _add_links(tree: LinkTree, i: int, body: RobotBody, parent: str, start: Place, shape: Shape) -> None:
-    """One link for each joint of a body, the last of which carries its mass."""
+    """Add one link for each moving joint of body number `i` to the tree; the last link carries the body's mass."""
     S = np.asarray(shape.turned.get(i, np.eye(3)))
     steps = list(_steps(body, shape))
     moving = [step for step in steps if isinstance(step, RobotJoint)]
@@ -137,7 +137,7 @@ def _add_links(tree: LinkTree, i: int, body: RobotBody, parent: str, start: Plac
 
 
 def _steps(body: RobotBody, shape: Shape) -> Iterator[RobotJoint | Place]:
-    """The joints of a body one behind the other, what is held and what is split taken into account."""
+    """Joints of a body, first to last; a held joint becomes a place, a split one joints of one coordinate."""
     for joint in body.joints:
         if joint.name in shape.fixed:
             yield joint_motion(joint, joint.value)
@@ -148,7 +148,7 @@ def _steps(body: RobotBody, shape: Shape) -> Iterator[RobotJoint | Place]:
 
 
 def split_joint(joint: RobotJoint) -> Iterator[RobotJoint | Place]:
-    """A joint of several coordinates as joints of one, at 0 in the reference posture."""
+    """A joint of several coordinates as a chain of joints of one, all at 0 in the reference posture."""
     plain = replace(joint, stiffness=0.0, damping=0.0, coulomb=0.0, armature=0.0, limits=None, second=None)
     if joint.kind == "universal":
         for k, axis in enumerate((joint.axis, joint.second)):
@@ -200,7 +200,7 @@ def _place_table(name: str, parent: str, joint: str, place: Place) -> dict[str, 
 
 
 def _give_mass(tree: LinkTree, mass: float, center: Floats, inertia: Floats) -> None:
-    """Mass and inertia of the last link, where masses are known."""
+    """Write mass [kg], centre (3,) [m] and inertia (3, 3) into the last link, if the file knows any masses."""
     if not tree.masses_known:
         return
     link = tree.links[-1]
@@ -213,7 +213,7 @@ def _give_mass(tree: LinkTree, mass: float, center: Floats, inertia: Floats) -> 
 
 
 def _coordinate(tree: LinkTree, name: str, joint: RobotJoint, S: Floats) -> None:
-    """The coordinate of a link's joint at the reference posture."""
+    """Record the coordinate of link `name`'s joint at the reference posture, turned by S (3, 3)."""
     if joint.kind == "prismatic":
         tree.joints_m[name] = float(joint.value)
     elif joint.kind == "free":
@@ -228,7 +228,7 @@ def _coordinate(tree: LinkTree, name: str, joint: RobotJoint, S: Floats) -> None
 
 
 def listed(vector: Any) -> list[float]:
-    """Numbers as a file holds them, no zero negative."""
+    """A vector as the list of numbers that a file holds, with 0 in place of -0."""
     return [float(x) + 0.0 for x in np.ravel(vector)]
 
 

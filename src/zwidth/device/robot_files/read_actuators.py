@@ -68,7 +68,7 @@ def _turns(mujoco: Any, model: Any, a: int) -> dict[str, float]:
 
 
 def _fixed_tendon(mujoco: Any, model: Any, tendon: int) -> dict[int, float]:
-    """Coefficients by joint; empty for a spatial tendon."""
+    """Coefficient of each joint, by its index, in a fixed tendon; empty for a spatial tendon."""
     first = int(model.tendon_adr[tendon])
     steps = range(first, first + int(model.tendon_num[tendon]))
     if any(int(model.wrap_type[k]) != int(mujoco.mjtWrap.mjWRAP_JOINT) for k in steps):

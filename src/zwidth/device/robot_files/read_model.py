@@ -141,7 +141,7 @@ def _site_place(model: Any, i: int) -> Place:
 
 
 def _tell_of_joints(model: Any, robot: Robot, qpos: Floats) -> None:
-    """What of joints is taken otherwise than it stands in the file."""
+    """Add findings about what a device file holds otherwise of joints: references, springs at rest, limits."""
     for j in range(model.njnt):
         where, at = f"joint '{model.joint(j).name}'", int(model.jnt_qposadr[j])
         single = int(model.jnt_type[j]) >= 2
@@ -203,7 +203,7 @@ def read_urdf(root: ElementTree.Element, label: str) -> Robot:
 
 
 def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
-    """What makes a document no tree of links."""
+    """Faults by which the links and joints of a URDF are no tree."""
     links = [link.get("name", "") for link in root.findall("link")]
     carried: dict[str, str] = {}
     for name in sorted({name for name in links if links.count(name) > 1}):
@@ -323,7 +323,7 @@ def _motors(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
 
 
 def _tell(root: ElementTree.Element, robot: Robot) -> None:
-    """What MuJoCo drops in silence, and numbers that look like another unit."""
+    """Add findings about parts of a URDF that MuJoCo ignores, and about numbers that look like another unit."""
     for joint in root.findall("joint"):
         where = f"joint '{joint.get('name', '')}'"
         for tag, what in PASSED_OVER.items():

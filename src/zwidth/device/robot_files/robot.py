@@ -53,7 +53,7 @@ class Place:
         return Place(self.turn.T, -self.turn.T @ self.at)
 
     def of_point(self, point: Floats) -> Floats:
-        """A point of the inner frame in the outer one."""
+        """The coordinates (3,) in the outer frame of a point given in the inner one."""
         return np.asarray(self.at + self.turn @ point)
 
 
@@ -91,7 +91,7 @@ class RobotJoint:
 
     @property
     def single(self) -> bool:
-        """Whether it has one coordinate."""
+        """Whether the joint has one coordinate."""
         return self.kind in ("revolute", "prismatic")
 
 
@@ -187,7 +187,7 @@ class Robot:
     findings: list[Finding] = field(default_factory=list)
 
     def note(self, where: str, what: str, severity: str = NOTE) -> None:
-        """Add a finding, once."""
+        """Add a finding about a part of the file, `where`, unless it is there already."""
         finding = Finding(where, what, severity)
         if finding not in self.findings:
             self.findings.append(finding)

@@ -52,7 +52,7 @@ def _lag_sentence(tau: float, T: float) -> str:
 
 
 def _too_late(delay: Any, T: Any = 1.0) -> Any:
-    """Whether finite delays, in a unit of so many sampling periods, are longer than any that is supported."""
+    """Whether finite delays are longer than the longest supported; T: sampling period in their unit."""
     return (delay / T > LONGEST_DELAY) & np.isfinite(delay)
 
 
@@ -92,7 +92,7 @@ def _estimate_rules(section: str, period: Read = Numbers.period) -> tuple[Rule, 
 
 
 def _noise(document: Document, section: str) -> KeyMessages:
-    """A linear estimate beside the wall's own; a method that uses the encoder's error needs its size."""
+    """Path and sentence of a feedback's velocity estimate that is not linear, and of a missing error size."""
     loop, place = table(document, "loop"), (*section.split("."), "velocity")
     velocity = table(loop if section == "loop" else table(loop, place[1]), "velocity")
     method = velocity.get("method")
@@ -110,7 +110,7 @@ def _noise(document: Document, section: str) -> KeyMessages:
 
 
 def _acceleration(velocity: Numbers) -> Any:
-    """Of a Kalman filter the accelerations that it expects [m/s²]."""
+    """The acceleration noise that a Kalman filter is built for [m/s²]; None of other estimates."""
     return velocity.number("acceleration_noise_m_per_s2") if velocity.held("method") == "kalman" else None
 
 
@@ -130,7 +130,7 @@ def _unusable_index(acceleration: Any, noise: Any, T: Any) -> Any:
 
 
 def _index_sentence(acceleration: float, noise: float, T: float) -> str:
-    """What the filter itself says of its noise figures."""
+    """The estimator's own message on why its noise figures [m/s²], [m] do not fit the period T [s]."""
     try:
         Kalman(acceleration, noise).alpha_beta(T)
     except ValueError as error:
@@ -139,7 +139,7 @@ def _index_sentence(acceleration: float, noise: float, T: float) -> str:
 
 
 def _sensor_handle(document: Document) -> KeyMessages:
-    """A force sensor sits at a handle."""
+    """Path and sentence of a force sensor on a plant of several coordinates without a handle."""
     plant = table(document, "plant")
     size = row_count(plant.get("mass_kg"))
     if "force_sensor" in table(document, "loop") and size is not None and size > 1 and "handle" not in plant:
@@ -150,7 +150,7 @@ def _sensor_handle(document: Document) -> KeyMessages:
 
 
 def _without_motion(document: Document) -> KeyMessages:
-    """What is commanded beside the wall's force needs a motion in time, which a loss factor has none of."""
+    """Path and sentence of each feedback on motion in time beside a loss factor, which has none."""
     for section in SENSED if table(document, "plant").get("loss_factor") else ():
         if section in table(document, "loop"):
             yield (
@@ -160,7 +160,7 @@ def _without_motion(document: Document) -> KeyMessages:
 
 
 def _acceleration_filter(document: Document) -> KeyMessages:
-    """An inertia that is cancelled needs a filter of the acceleration."""
+    """Path and sentence of a missing acceleration filter where the feedforward cancels inertia."""
     ahead = table(table(document, "loop"), "feedforward")
     cancels = [key for key in INERTIAS.split() if is_number(ahead.get(key)) and ahead[key] > 0]
     if cancels and "acceleration_filter" not in ahead:
@@ -236,7 +236,7 @@ RESPONSE: Final[tuple[Rule, ...]] = (
 
 
 def _sampling(document: Document) -> KeyMessages:
-    """Only a mechanism has answers without a computer."""
+    """Path and sentence of a missing sampling period, without which only a mechanism has answers."""
     loop = document.get("loop")
     if not isinstance(loop, dict) or "sampling_period_s" in loop or "mechanism" in document:
         return

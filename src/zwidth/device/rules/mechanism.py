@@ -44,7 +44,7 @@ STIFFNESSES: Final = (
 
 
 def _tree(document: Document) -> KeyMessages:
-    """Links: unique names, parents that exist, no link its own ancestor."""
+    """Path and sentence of links of which names repeat, parents do not exist, or that are their own ancestor."""
     mechanism = table(document, "mechanism")
     parents: dict[str, Any] = {}
     for index, link in tables(mechanism, "links"):
@@ -98,7 +98,7 @@ def _no_link(name: str, links: Collection[str]) -> str:
 
 
 def _references(document: Document) -> KeyMessages:
-    """Loops, handle and drives speak of links that exist; drives of revolute joints, one each."""
+    """Path and sentence of loops, handle or drives on links or joints that do not exist or do not fit."""
     mechanism = table(document, "mechanism")
     links = _joints(mechanism)
     yield from _links_of_loops(mechanism, links)
@@ -142,7 +142,7 @@ def _links_of_loops(mechanism: dict[str, Any], links: dict[str, Any]) -> KeyMess
 
 
 def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
-    """Drives that turn with other joints, which are driven or free; motors on links that exist."""
+    """Path and sentence of couplings of drives to joints neither driven nor free, and motors on no link."""
     of_links = [link for _, link in tables(mechanism, "links") if link.get("free") is True]
     free = {name for link in of_links if isinstance(name := link.get("name"), str)}
     for index, drive in tables(mechanism, "drives"):
@@ -165,7 +165,7 @@ def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str
 
 
 def _ratio_tables(document: Document) -> KeyMessages:
-    """A ratio table instead of one ratio, without coupling, that fits the drive's joint and its limits."""
+    """Path and sentence of ratio tables beside a ratio or coupling, or unfit for the joint and its limits."""
     mechanism = table(document, "mechanism")
     links = {link["name"]: link for _, link in tables(mechanism, "links") if isinstance(link.get("name"), str)}
     for index, drive in tables(mechanism, "drives"):
@@ -187,7 +187,7 @@ def _ratio_tables(document: Document) -> KeyMessages:
 
 
 def _ratio_table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMessages:
-    """Coordinates of the joint's kind, a ratio at each of them, no limits of the joint beyond them."""
+    """Path and sentence of one ratio table whose coordinates, ratios or range do not fit its drive's joint."""
     joint = link["joint"]
     key, limits_key, unit = OF_JOINT[joint]  # no names in the sentences: the copies of a leg have the same fault
     for other, *_ in OF_JOINT.values():
@@ -227,7 +227,7 @@ def _ratio_table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) ->
 
 
 def _assemblies(document: Document) -> KeyMessages:
-    """Coordinates of the joints that have some, in the right table, as many as the joint has."""
+    """Path and sentence of assemblies whose tables lack joints, name others or give a wrong number count."""
     mechanism = table(document, "mechanism")
     joints = _joints(mechanism)
     turning = {name: count for name, joint in joints.items() if (count := ANGLES.get(joint, 0))}
@@ -269,7 +269,7 @@ def _coordinates(path: KeyPath, given: dict[str, Any], counts: dict[str, int], m
 
 
 def _joint_keys(document: Document) -> KeyMessages:
-    """Keys of a link that only some joints have."""
+    """Path and sentence of each key of a link that its kind of joint does not read."""
     for index, link in tables(table(document, "mechanism"), "links"):
         joint = link.get("joint")
         if not isinstance(joint, str):
@@ -283,14 +283,14 @@ def _joint_keys(document: Document) -> KeyMessages:
 
 
 def _beams(document: Document) -> KeyMessages:
-    """What is wrong between the keys of each link with a [beam]: length, joint, section or stiffnesses, modes."""
+    """Path and sentence of each disagreement of a link and its [beam]: length, joint, section, modes."""
     for path, link in places(document, "mechanism.links.*"):
         if isinstance(link.get("beam"), dict):
             yield from _beam(path, link)
 
 
 def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
-    """What is wrong with one such link, which stands at a path."""
+    """Path and sentence of each disagreement of one link, at `place`, and its [beam]."""
     beam, at = table(link, "beam"), (*place, "beam")
     length = link.get("length_m", 0.0)
     if is_number(length) and not length > 0.0:
@@ -333,7 +333,7 @@ def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
 
 
 def _wall(place: KeyPath, section: dict[str, Any]) -> KeyMessages:
-    """A wall that is thicker than half of what it is the wall of."""
+    """Path and sentence of a hollow section's wall that is thicker than half the section."""
     across = [section[key] for key in ("outer_diameter_m", "width_m", "height_m") if is_number(section.get(key))]
     wall = section.get("wall_m")
     if is_number(wall) and across and min(across) > 0.0 and wall > 0.5 * min(across) * (1.0 + 1e-12):
@@ -363,12 +363,12 @@ def _workspace_rule(index: int, axis: str) -> NumberRule:
 
 
 def _pair(bounds: Any) -> Any:
-    """Two bounds (..., 2); None of anything else."""
+    """Lower and upper bounds (..., 2); None of a value that is no two numbers."""
     return bounds if bounds is not None and np.shape(bounds)[-1] == 2 else None
 
 
 def _damping(document: Document) -> KeyMessages:
-    """One way of structural damping."""
+    """Path and sentence of a [mechanism.damping] that gives no way of damping, or several."""
     damping, path = table(document, "mechanism").get("damping"), ("mechanism", "damping")
     if isinstance(damping, dict):
         proportional = {"mass_coefficient_1_per_s", "stiffness_coefficient_s"} & damping.keys()
@@ -391,7 +391,7 @@ def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
 
 
 def _of_named_links(document: Document) -> KeyMessages:
-    """What speaks of links by their names, where any has one."""
+    """Faults of tables that name links: loops, handle, drives, ratio tables, assemblies; none without links."""
     if _joints(table(document, "mechanism")):
         yield from rule_faults((_references, _ratio_tables, _assemblies), document)
 
@@ -426,7 +426,7 @@ def _in_arm(path: KeyPath) -> KeyPath:
 
 
 def _no_drives(document: Document) -> KeyMessages:
-    """A mechanism and its legs have drives."""
+    """Path and sentence of a mechanism of which neither it nor its legs have drives."""
     mechanism = table(document, "mechanism")
     owners = [mechanism, *(leg for _, leg in tables(mechanism, "legs"))]
     if mechanism and mechanism.get("drives", []) == [] and not any(tables(owner, "drives") for owner in owners):

@@ -57,14 +57,14 @@ def _springless(stiffness: Any) -> bool:
 
 
 def _along_fault(place: KeyPath, along: Any, size: int | None) -> KeyMessages:
-    """A vector over the plant's coordinates has as many numbers as there are coordinates."""
+    """Path and sentence of a vector whose length is not the plant's number of coordinates, `size`."""
     length = 1 if is_number(along) else len(along) if isinstance(along, list) else None
     if size is not None and length is not None and length != size:
         yield place, f"has {plural(length, 'number')}, but mass_kg has {plural(size, 'row')}; give {size}"
 
 
 def _along(document: Document) -> KeyMessages:
-    """Springs, brakes and windings of a plant move along as many coordinates as it has."""
+    """Path and sentence of spring, brake or winding vectors that do not fit the plant's coordinates."""
     plant = table(document, "plant")
     size = row_count(plant.get("mass_kg"))
     for group in ("spring", "brake", "electrical_damping"):
@@ -79,7 +79,7 @@ def _along(document: Document) -> KeyMessages:
 
 
 def _reading(document: Document) -> KeyMessages:
-    """Step and noise of the reading are given in metres for a [plant] only."""
+    """Path and sentence of [loop.encoder] keys in metres that a mechanism or a measured response does not read."""
     loop = table(document, "loop")
     encoder, velocity = table(loop, "encoder"), table(loop, "velocity")
     kalman = velocity.get("method") == "kalman"
@@ -116,7 +116,7 @@ def _friction(document: Document) -> KeyMessages:
 
 
 def _levels(value: Any) -> list[float]:
-    """The numbers of a list or of one number; [] where there is another thing."""
+    """The numbers of a list or of one number; [] for anything else."""
     values = value if isinstance(value, list) else [value]
     return list(values) if values and all(map(is_number, values)) else []
 
@@ -164,7 +164,7 @@ def _grip(
 
 
 def _drive_friction(document: Document) -> KeyMessages:
-    """[mechanism.friction] and the levels of the drives."""
+    """Path and sentence of faults of [mechanism.friction] and of the drives' friction levels."""
     mechanism = table(document, "mechanism")
     section = table(mechanism, "friction")
     model = section.get("model", "coulomb")
@@ -245,7 +245,7 @@ def largest_ratio(drive: dict[str, Any]) -> Any:
 
 
 def _usable(number: Any) -> Any:
-    """Whether numbers are positive and may be squared and divided by, elementwise."""
+    """Whether numbers are positive and small enough to be squared and divided by, elementwise."""
     return (number > 0.0) & (number < LARGEST)
 
 
@@ -331,7 +331,7 @@ def operator_faults(document: Document) -> KeyMessages:
 
 
 def _load_forces(document: Document) -> KeyMessages:
-    """One force of the hand, and not 0."""
+    """Path and sentence of a hand's force in [load] that stands beside another, or is 0."""
     load = table(document, "load")
     given = [key for key in FORCES if load.get(key) is not None]
     if len(given) > 1:
@@ -347,7 +347,7 @@ def _load_forces(document: Document) -> KeyMessages:
 
 
 def _load_surface(document: Document) -> KeyMessages:
-    """What a handle slides along as it settles."""
+    """Path and sentence of a surface's radius in [load] that is 0 or -inf, or stands beside settle."""
     load = table(document, "load")
     radius = load.get("surface_radius_m")
     if is_number(radius) and radius in (0, -inf):

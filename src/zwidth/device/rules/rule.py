@@ -38,7 +38,7 @@ class Numbers(NamedTuple):
     values: Mapping[KeyPath, Floats] = MappingProxyType({})
 
     def held(self, key: str) -> Any:
-        """What the document has at a dotted path below the table; None where it has nothing."""
+        """The value in the document at a dotted path below the table; None where there is none."""
         return _held(self.document, (*self.path, *steps_of(key)))
 
     def number(self, key: str) -> Any:
@@ -64,12 +64,12 @@ class Numbers(NamedTuple):
         return held if is_number(held) else None
 
     def period(self) -> Any:
-        """The sampling period [s]; None where there is none that may be."""
+        """The sampling period [s]; None where the document has none in (0, 1] s."""
         T = self._number(PERIOD)
         return T if self.values or (T is not None and 0 < T <= 1) else None
 
     def local_period(self) -> Any:
-        """The sampling period of [loop.local] [s]; None where there is none that may be."""
+        """The sampling period of [loop.local] [s]; None where the document gives no valid one."""
         T, times = self.period(), _held(self.document, ("loop", "local", "rate_multiple"))
         return T / times if T is not None and type(times) is int and 1 <= times <= MOST_FAST_SAMPLES else None
 
@@ -86,7 +86,7 @@ def _held(place: Any, steps: KeyPath) -> Any:
 
 @cache
 def steps_of(key: str) -> KeyPath:
-    """A dotted path as keys and indices."""
+    """A dotted path as a tuple of keys and, of digits, list indices."""
     return tuple(int(step) if step.isdigit() else step for step in key.split(".") if step)
 
 

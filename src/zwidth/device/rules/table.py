@@ -44,7 +44,7 @@ from zwidth.model.design_axes import join_designs
 
 
 def _one_kind(document: Document) -> KeyMessages:
-    """A device is given by one of a mechanism, a plant and a response."""
+    """Path and sentence of a device given by none or several of [mechanism], [plant] and [response]."""
     given = [f"[{kind}]" for kind in KINDS if kind in document]
     if not given:
         yield (), "has neither [mechanism] nor [plant] nor [response]; give one of them"
@@ -53,14 +53,14 @@ def _one_kind(document: Document) -> KeyMessages:
 
 
 def _sources(document: Document) -> KeyMessages:
-    """Sources are of keys there are."""
+    """Path and sentence of each entry of [sources] whose path is no key of a device file."""
     for key in flat_sources(table(document, "sources")):
         if not exists(document, key) and not in_schema(key):
             yield ("sources", key), "names no key of this file; give a dotted path, with * for any step"
 
 
 def _partly_missing(document: Document) -> KeyMessages:
-    """What is known of some links or drives is known of all."""
+    """Path and sentence of each mass, inertia or ratio that some links or drives lack and others give."""
     for path in partly_missing(table(document, "mechanism")):
         yield path, "is missing; give it here, or nowhere if it is not known"
 

@@ -216,14 +216,14 @@ def _free(path: tuple[str | int, ...]) -> bool:
 
 
 def _of_kind(subschema: dict[str, Any], table: Any) -> bool:
-    """Whether a table of a document is of the kind that a subschema describes, or of any where nothing says so."""
+    """Whether a table has the tag (type, method, ...) that a subschema demands; true where it demands none."""
     properties = subschema.get("properties", {}) if isinstance(table, dict) else {}
     tags = [(tag, properties[tag]) for tag in TAGS if "const" in properties.get(tag, {})]
     return all(one["const"] == table.get(tag, one.get("default")) for tag, one in tags)
 
 
 def _inside(place: Any, part: str | int) -> Any:
-    """What a document has at a step; None where it has nothing."""
+    """The value of a document's table or list at a key or index; None where there is none."""
     if isinstance(place, dict):
         return place.get(str(part))
     return place[part] if isinstance(place, list) and isinstance(part, int) and part < len(place) else None

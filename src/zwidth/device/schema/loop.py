@@ -80,7 +80,7 @@ class _Method(Section):
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
-        """Build the estimator, which raises ValueError where parameters do not fit each other."""
+        """The section itself. Raises ValueError where its parameters make no estimator."""
         own = self.parameters()
         if None not in own.values():
             METHODS[self.method](**own)
@@ -139,7 +139,7 @@ class SavitzkyGolaySection(_Method):
     @field_validator("order")
     @classmethod
     def _below_samples(cls, order: int, info: ValidationInfo) -> int:
-        """Refuse an order that so many samples cannot determine."""
+        """The order of the polynomial itself. Raises ValueError where it is not below the number of samples."""
         samples = info.data.get("samples")
         if samples is not None and order >= samples:
             raise ValueError(
@@ -225,7 +225,8 @@ LONGEST_DELAY: Final = 100  # samples; each adds a state to the loop
 
 
 def _a_period(value: Any) -> Any:
-    """Refuse a frequency, and a period so short that a sample changes the plant by less than rounding does."""
+    """The value itself. Raises ValueError for a sampling period above 1 s, which may be a frequency in Hz, or
+    below 1e-7 s, in which rounding hides the plant's motion; what is no number is left to other checks."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return value
     allowed = f"must be {SHORTEST_PERIOD:g} <= T <= {LONGEST_PERIOD:g} s, got {quote(value)}"

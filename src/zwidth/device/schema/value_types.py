@@ -116,7 +116,7 @@ def _as_vector(value: Any) -> Any:
 
 
 def _few(value: Any) -> Any:
-    """One number or a list of them, as a list that may hold zeros."""
+    """One number or a list of them, as a list, zeros allowed. Raises ValueError for an empty list."""
     value = _as_vector(value)
     if not value:
         raise ValueError("must not be empty; give a number for each coordinate")
@@ -152,7 +152,7 @@ def _square(rows: Rows) -> Rows:
 
 
 def _symmetric(matrix: Floats) -> magnitudes.Judgement:
-    """Matrices (..., n, n) are symmetric, but for rounding."""
+    """Whether matrices (..., n, n) are not symmetric, rounding apart, and the sentence of one."""
     gap = np.abs(matrix - np.swapaxes(matrix, -1, -2))
 
     def sentence() -> str:
@@ -167,7 +167,7 @@ def _symmetric(matrix: Floats) -> magnitudes.Judgement:
 
 
 def _positive_definite(matrix: Floats) -> magnitudes.Judgement:
-    """Symmetric matrices (..., n, n) are positive definite, but for rounding."""
+    """Whether symmetric matrices (..., n, n) are not positive definite, and the sentence of one."""
     size, eigenvalues = matrix.shape[-1], np.linalg.eigvalsh(matrix)
     least = eigenvalues[..., 0]
     return (
@@ -182,15 +182,15 @@ def _positive_definite(matrix: Floats) -> magnitudes.Judgement:
 
 
 def _one_or_three(rows: Rows) -> Rows:
-    """The moments of inertia of a body: one, or a matrix of three rows."""
+    """The rows of an inertia. Raises ValueError where they are neither one nor three."""
     if len(rows) not in (1, 3):
         raise ValueError(f"must be {INERTIA_FORMS}, got {len(rows)} rows")
     return rows
 
 
 def _possible_body(matrix: Floats) -> magnitudes.Judgement:
-    """Of the principal moments of bodies none is negative and none of three above the sum of the others, but for
-    rounding."""
+    """Whether inertias (..., 3, 3) or (..., 1, 1) are those of no body: a principal moment is negative, or above
+    the sum of the others, rounding apart; and the sentence of one."""
     if matrix.shape[-1] == 1:
         return matrix[..., 0, 0] < 0.0, lambda: f"must be at least 0, got {matrix[0, 0]:.10g}"
     moments = np.linalg.eigvalsh(matrix)
@@ -198,7 +198,7 @@ def _possible_body(matrix: Floats) -> magnitudes.Judgement:
     negative = moments[..., 0] < -slack
 
     def sentence() -> str:
-        """What is wrong with the principal moments [kg m^2] of one body."""
+        """What is wrong with the principal moments [kg m²] of one body."""
         listed = ", ".join(f"{moment:.6g}" for moment in moments)
         if negative:
             return f"must have no negative principal moment, got {listed}; no body has one"
