@@ -48,7 +48,7 @@ ACCURACY: Final = 1e-4  # of the range of stable dampings, or of the stiffness
 
 
 class SearchWindow(NamedTuple):
-    """Where to look: stiffnesses [N/m] and dampings [N s/m]."""
+    """Walls to be searched: least and largest stiffness [N/m], and least and largest damping [N s/m]."""
 
     stiffness: tuple[float, float]
     damping: tuple[float, float]
@@ -162,6 +162,7 @@ _Column = tuple[float, float, bool]
 
 
 def _check(box: SearchWindow | None) -> None:
+    """Raise ArgumentError for a search window with an empty or infinite range, or without a stiffness above 0."""
     if box is None:
         return
     for name, unit, span in zip(("stiffness", "damping"), ("N/m", "N s/m"), box, strict=True):
@@ -178,6 +179,7 @@ def _within(box: SearchWindow | None) -> tuple[float, float]:
 
 
 def _none(box: SearchWindow | None) -> str:
+    """Message: no stable wall was found in this search window, or anywhere for None."""
     where = (
         ""
         if box is None
@@ -216,12 +218,13 @@ def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Flo
 
 
 def _powers(largest: float, least: float) -> Floats:
+    """Values up to `largest`, evenly in the logarithm, PER_DECADE a decade, from its share `least` on."""
     count = int(np.ceil(-PER_DECADE * np.log10(least)))
     return np.asarray(largest * 10.0 ** (np.arange(-count, 1) / PER_DECADE))
 
 
 def _masses(plant: Plant) -> tuple[float, float]:
-    """Mass that a sudden force at the wall accelerates, and that of a steady one [kg]."""
+    """Mass that a sudden force at the wall accelerates, and the one that a steady force does [kg]."""
     inverse = np.linalg.inv(plant.mass)
     a, s, shape = plant.actuator, plant.sensor, least_deforming_motion(plant)
     light = 1.0 / float(np.sqrt((a @ inverse @ a) * (s @ inverse @ s)))
@@ -262,7 +265,9 @@ def _largest_stiffnesses(
 ) -> list[_Column]:
     """The largest stable stiffness at dampings B (m,), from a start that should be stable; 0 where it is not.
 
-    Of a nonlinear device the lowest change counts, whatever `levels` says.
+    Of a nonlinear device the lowest change counts, whatever `levels` (see `observe`) says. Returns as `_Column`.
+
+    tolerance  as a share of the start;   within  softest and stiffest wall [N/m];   step  (m,)  the first [N/m]
     """
     least, most = within
     m = len(B)
@@ -381,6 +386,7 @@ def _lowered(trial: StabilityTrial, damping: Floats, start: Floats, least: float
 
 
 def _point(K: float, B: float, edge: EdgeKind, observation: Observation | None, unsure: bool = False) -> EdgePoint:
+    """Point of the boundary at K [N/m], B [N s/m], with what its first unstable wall showed; None: it has none."""
     if observation is None:
         return EdgePoint(K, B, edge, None, float("nan"), float("nan"), unsure)
     return EdgePoint(K, B, edge, observation.behaviour, observation.amplitude, observation.frequency, unsure)
@@ -414,9 +420,11 @@ class SearchLines(NamedTuple):
     outwards: Floats
 
     def at(self, t: Floats) -> Floats:
+        """Walls (m, 2) on the lines at distances t (m,) from their starts."""
         return np.asarray(self.start + t[:, None] * self.outwards)
 
     def only(self, lanes: Flags | NDArray[np.intp]) -> SearchLines:
+        """Those of the lines that flags (m,) or indices choose."""
         return SearchLines(self.start[lanes], self.outwards[lanes])
 
 
@@ -484,7 +492,7 @@ def nearest_change(
     """Move the end of each line back to the first change of the verdict; ends with a stable way to them stay.
 
     brackets      along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
-    start_stable  is the start of each line known to be stable? If not, the way begins at the first stable wall
+    start_stable  whether each line's start is known to be stable; if not, the way begins at the first stable wall
     Returns       as `brackets`; stable 0 where no stable wall was met
     """
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)

@@ -231,7 +231,7 @@ def weigh_readings(window: Floats, past: Floats, reading: float) -> float:
 
 @compiled_inline
 def estimate_velocity(computer: Computer, signals: Signals, s: int, reading: float, sample: int) -> float:
-    """The estimated velocity of coordinate s, which stood where it was first read before sample 0."""
+    """The estimated velocity of coordinate s [m/s], which stood where it was first read before sample 0."""
     if sample == 0:
         signals.first[s] = reading
     # counted from the first reading: a memory of zeros is then a device that has stood still before
@@ -290,7 +290,7 @@ def scrambled(x: np.uint64) -> np.uint64:
 
 @compiled
 def uniform(seed: np.uint64, sample: int, channel: int, draw: int) -> float:
-    """Uniform in (0, 1)."""
+    """Random number, uniform in (0, 1); the same for the same seed, sample, channel and draw."""
     key = scrambled(seed + np.uint64(0x9E3779B97F4A7C15))
     key = scrambled(key ^ (np.uint64(sample) * np.uint64(0x9E3779B97F4A7C15)))
     key = scrambled(key + np.uint64(2 * channel + draw + 1) * np.uint64(0xD1B54A32D192ED03))
@@ -299,7 +299,7 @@ def uniform(seed: np.uint64, sample: int, channel: int, draw: int) -> float:
 
 @compiled
 def normal_number(seed: np.uint64, sample: int, channel: int) -> float:
-    """Standard normal, by Box and Muller."""
+    """Standard normal random number of a channel at a sample, by Box and Muller."""
     radius = np.sqrt(-2.0 * np.log(uniform(seed, sample, channel, 0)))
     return float(radius * np.cos(2.0 * np.pi * uniform(seed, sample, channel, 1)))
 

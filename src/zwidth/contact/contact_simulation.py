@@ -209,7 +209,7 @@ class ContactSimulation(Result):
 
     @property
     def velocity(self) -> Floats:
-        """(S,) its estimate [m/s]"""
+        """(S,) the estimate of the reading's velocity [m/s]"""
         return self.response.velocity
 
     @property
@@ -273,6 +273,7 @@ class ContactSimulation(Result):
         return self.response.table()
 
     def _passivity_document(self) -> dict[str, Any] | None:
+        """Effect of the passivity controller by key and unit; None without one."""
         if self.passivity is None:
             return None
         felt, without, judged = self.passivity
@@ -287,6 +288,7 @@ class ContactSimulation(Result):
         }
 
     def __repr__(self) -> str:
+        """Lines with the environment, the verdict, the size of motion and force, and the length of the run."""
         units = {parameter.name: unit_text(parameter.unit) for parameter in self.environment.parameters}
         values = [f"{name} {value:.4g} {units[name]}".rstrip() for name, value in self.parameters.items()]
         verdict = {True: "stable", False: "not stable", None: "undecided"}[self.stable]
@@ -303,6 +305,7 @@ class ContactSimulation(Result):
 
 
 def _felt_stiffness(response: TimeResponse) -> float:
+    """Stiffness that was felt in a run [N/m]."""
     return rendered_stiffness(response.reading, response.force, response.wall_position)
 
 
@@ -373,7 +376,7 @@ def contact_run_length(
     """Seconds worth simulating of one contact.
 
     loop             without its operator;   growth  predicted with him
-    controlled       does a passivity controller act on the wall's force?
+    controlled       whether a passivity controller acts on the wall's force
     seconds_to_hear  of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]
     """
     free = hand.tremor is None and hand.reach is None and not controlled
@@ -439,6 +442,7 @@ def _periods(frequency: float) -> float:
 
 
 def _capped(seconds: float, reason: str, period: float) -> RunLength:
+    """Length of a run of so many seconds, or the longest that is allowed, with its reason."""
     most = min(MOST, MOST_SAMPLES * period)
     return RunLength(seconds, reason) if seconds <= most else RunLength(most, f"{reason}, at most this")
 

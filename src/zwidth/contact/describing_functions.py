@@ -28,7 +28,7 @@ def _positive(**values: ArrayLike) -> None:
 
 
 def _each(gain: Callable[..., float], *values: ArrayLike) -> Floats:
-    """A compiled gain of numbers, of arrays that are broadcast."""
+    """Gains (...) of values (...), which are broadcast, by a compiled function of single numbers."""
     return np.asarray(np.vectorize(gain, otypes=[float])(*(np.asarray(value, dtype=float) for value in values)))
 
 
@@ -108,7 +108,7 @@ def saturation(amplitude: ArrayLike, limit: ArrayLike) -> Floats:
 
 @compiled_lean
 def saturation_gain(amplitude: float, limit: float) -> float:
-    """`saturation` of one force."""
+    """Gain of one force of this amplitude [N] that is cut off at a limit [N], as `saturation`."""
     s = min(limit / amplitude, 1.0)
     return float(2.0 / np.pi * (np.arcsin(s) + s * np.sqrt(1.0 - s * s)))
 

@@ -80,7 +80,7 @@ def energy_of(devices: PlantArrays, d: int, states: Floats) -> float:
 
 @compiled_lean
 def form(matrices: Floats, d: int, part: int, x: Floats) -> float:
-    """x . matrices[d, part] x"""
+    """Quadratic form x . matrices[d, part] x of a vector x (n,)."""
     total = 0.0
     for i in range(x.size):
         for k in range(x.size):
@@ -100,7 +100,7 @@ def enter_substep(
     forces: Floats,
     book: Ledger,
 ) -> None:
-    """Enter the work done over one substep."""
+    """Enter the work [J] done over one substep, between states (R,) before and after, under these forces [N]."""
     N, n, X = devices.energy.shape[1], devices.size[d], book.work
     for i in range(N):
         X[i] = before[i]

@@ -44,6 +44,7 @@ class HeldDevice:
     """
 
     def __init__(self, loop: Loop, hand: Hand) -> None:
+        """Attach the hand's operator to the loop's plant, and list the nonlinear elements of both."""
         operator = hand.operator
         self.loop = loop
         self.attached_plant = loop.plant if operator is None else attach(loop.plant, operator)
@@ -68,7 +69,7 @@ class HeldDevice:
 
     @cached_property
     def undeformed(self) -> Floats:
-        """See the function of this name."""
+        """Motion (n,) of one metre at the sensor that deforms the attached plant least."""
         return least_deforming_motion(self.attached_plant)
 
     @property
@@ -78,7 +79,7 @@ class HeldDevice:
 
     @property
     def limit(self) -> float:
-        """Largest force there is [N]."""
+        """Largest force that the loop can render [N]."""
         return self.loop.nonlinear.force_limit
 
 
@@ -94,6 +95,7 @@ def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
 
 
 def _own_elements(plant: Plant) -> list[Element]:
+    """Kind, numbers and motion (n,) of each friction, spring and brake of a plant; idle frictions are left out."""
     own, elements = plant.nonlinear, list[Element]()
     for dry in own.friction:
         bent = dry.bristles
@@ -107,7 +109,7 @@ def _own_elements(plant: Plant) -> list[Element]:
 
 
 def _spring_numbers(spring: Spring) -> tuple[float, ...]:
-    """A spring as `elements.bent_spring_force` takes it."""
+    """Cubic term, excess, offset, held force, tangent and kink, as `plant_step.bent_spring_force` takes them."""
     cubic, excess, offset = spring.cubic, spring.backward_excess, spring.offset
     held = cubic * offset**3 + excess * min(offset - spring.kink, 0.0)
     tangent = 3.0 * cubic * offset**2 + (excess if spring.backward else 0.0)
@@ -225,12 +227,13 @@ def reading_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Flo
 
 
 def _dynamics(held_device: HeldDevice) -> LinearDynamics:
-    """With inputs for the command, the push, and its own elements; the exponentials know no padding."""
+    """Linear dynamics with inputs for the command, the push and the device's own elements, without padding."""
     motions = np.array([held_device.push, *(along for _, _, along in held_device.elements)])
     return dynamics(held_device.modal_plant, held_device.loop.controller.actuator_time_constant, motions)
 
 
 def _fill_motions(arrays: PlantArrays, d: int, held_device: HeldDevice) -> None:
+    """Fill in device d's sensor, handle, push, elements, sampled forces and encoders."""
     n = held_device.modal_plant.size
     arrays.sensor[d, :n], arrays.handle[d, :n], arrays.push[d, :n] = (
         held_device.modal_plant.sensor,

@@ -101,6 +101,7 @@ class _Feedback(NamedTuple):
 
 
 def _own_feedback(controller: Controller) -> _Feedback:
+    """Feedback of one computer in numbers; zeros, and no factors, for a part that it does not have."""
     T, sensor, ahead, local = (
         float(controller.sampling_period),
         controller.force_sensor,
@@ -131,7 +132,7 @@ def _own_feedback(controller: Controller) -> _Feedback:
 
 
 def _factors(low_pass: LowPass | None, period: float) -> Floats:
-    """Factors (k, 2, 3) of a low pass."""
+    """Factors (k, 2, 3) of a low pass sampled with a period [s]; none for None."""
     top, bottom = (np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(low_pass, period))
     return np.stack([top, bottom], axis=1)
 
@@ -144,6 +145,7 @@ def _estimate(method: LinearMethod, low_pass: LowPass | None, period: float) -> 
 
 
 def _padded(windows: Sequence[Floats]) -> Floats:
+    """Windows of any lengths as rows (D, w), padded with zeros."""
     out = np.zeros((len(windows), max(map(len, windows))))
     for row, window in zip(out, windows, strict=True):
         row[: len(window)] = window
@@ -151,6 +153,7 @@ def _padded(windows: Sequence[Floats]) -> Floats:
 
 
 def _padded_factors(factors: Sequence[Floats]) -> Floats:
+    """Factors (k, 2, 3) of D computers, any k, as (D, k, 2, 3), padded by factors that change no signal."""
     out = np.empty((len(factors), max(map(len, factors)), 2, 3))
     out[:] = PASSES
     for rows, own in zip(out, factors, strict=True):
@@ -178,7 +181,7 @@ def feedback_memory(arrays: FeedbackArrays, d: int) -> FeedbackMemory:
 def read_force(
     arrays: FeedbackArrays, d: int, states: Floats, command: float, push: float, forces: Floats
 ) -> float:
-    """The force between sensor and hand just before a sample, under the command that has acted until then."""
+    """The force between sensor and hand just before a sample [N], under the command that has acted until then."""
     N = arrays.measured.shape[1] - 2 - forces.size
     total = float(arrays.measured[d, N] * command + arrays.measured[d, N + 1] * push)
     for i in range(N):

@@ -55,7 +55,7 @@ class DevicePlane:
 
 
 def plane_region(beta: float, sigma: float, delay_samples: float = 0.0) -> str:
-    """The region of one point.
+    """The name of the region in which a point (beta, sigma) of the plane lies.
 
     >>> plane_region(0.6, 0.4), plane_region(0.1, 0.8), plane_region(0.6, 0.4, delay_samples=1)
     ('small vibrations', 'large vibrations', 'small and large vibrations')

@@ -39,6 +39,7 @@ class Reach(Documented):
     duration: float = field(default=0.5, metadata=entry("s"))
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a distance, start or duration that is not allowed."""
         _check("distance", self.distance, "m", -inf)
         _check("start", self.start, "s", 0.0)
         _check("duration", self.duration, "s", 0.0, open_end=True)
@@ -57,6 +58,7 @@ class Tremor(Documented):
     phase: float = 0.0
 
     def __post_init__(self) -> None:
+        """Raise ValueError for an amplitude, frequency or phase that is not allowed."""
         _check("amplitude", self.amplitude, "N", 0.0)
         _check("frequency", self.frequency, "Hz", 0.0)
         _check("phase", self.phase, "rad", -inf)
@@ -83,6 +85,7 @@ class Reflex(Documented):
     grasp_damping: float = 0.0
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a number that is negative or not finite."""
         _check("threshold", self.threshold, "N", 0.0)
         _check("latency", self.latency, "s", 0.0)
         _check("rise", self.rise, "s", 0.0)
@@ -111,6 +114,7 @@ class Hand(Documented):
     reflex: Reflex | None = field(default=None, metadata=entry())
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a push or ramp that is not allowed, or a movement that needs an operator."""
         _check("push", self.push, "N", -inf)
         _check("ramp", self.ramp, "s", 0.0)
         if self.operator is None and (self.reach is not None or self.reflex is not None):
@@ -141,6 +145,7 @@ class Hand(Documented):
 
 
 def _check(name: str, value: float, unit: str, least: float, *, open_end: bool = False) -> None:
+    """Raise ValueError for a number that is not finite or below `least`, with `open_end` also for that itself."""
     if not isfinite(value) or value < least or (open_end and value == least):
         allowed = "finite" if least == -inf else "positive" if open_end else "finite and not negative"
         raise ValueError(f"{name} must be {allowed} [{unit}], got {value!r}")

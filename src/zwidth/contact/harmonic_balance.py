@@ -62,8 +62,8 @@ class LimitCycle(Documented):
     """A limit cycle: a vibration whose amplitude stays the same.
 
     amplitude            of the sensor's motion, before rounding [m]
-    frequency_Hz
-    stable               do smaller vibrations grow into it, and larger ones shrink?
+    frequency_Hz         of the vibration
+    stable               whether smaller vibrations grow into it, and larger ones shrink
     force_amplitude      of the commanded force before saturation [N]
     velocity_amplitudes  (f,)  at each dry friction [m/s]
     largest_motion       as far as the device can move to either side [m]
@@ -208,7 +208,7 @@ def harmonic_balance(
 
 
 def _nothing(largest_motion: float) -> HarmonicBalance:
-    """Of a loop in which nothing depends on the amplitude."""
+    """Empty balance, of a loop in which nothing depends on the amplitude."""
     return HarmonicBalance(np.zeros(0), np.zeros(0), np.zeros(0), (), largest_motion)
 
 
@@ -292,21 +292,23 @@ def _followed(loop: EquivalentLoop, amplitudes: Floats, tell: Callable[[int], No
 
 
 def _faster(one: Vibration | None, other: Vibration | None) -> Vibration | None:
-    """The one that grows faster."""
+    """The one of two vibrations that grows faster; None where neither is one."""
     known = [swing for swing in (one, other) if swing is not None]
     return max(known, key=lambda swing: abs(swing.root), default=None)
 
 
 def _growth(loop: EquivalentLoop, swing: Vibration | None) -> float:
+    """Rate at which a vibration grows [1/s]; -inf for None."""
     return float(np.log(abs(swing.root)) / loop.loop.period) if swing else -np.inf
 
 
 def _frequency(loop: EquivalentLoop, swing: Vibration) -> float:
+    """Frequency of a vibration [Hz]."""
     return float(np.angle(swing.root) / (2.0 * np.pi * loop.loop.period))
 
 
 def _crossings(loop: EquivalentLoop, at: Floats, swings: list[Vibration | None]) -> list[LimitCycle]:
-    """Where growth changes sign, and by which way."""
+    """Limit cycles where growth changes sign between amplitudes `at` (p,) [m], stable where larger ones die."""
     crossings = []
     for one, two in pairwise(swings):
         if two is None or (one is None and abs(two.root) <= 1.0):
@@ -331,6 +333,7 @@ def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: Size
     known = [low, high]
 
     def grown(logarithm: float) -> Vibration | None:
+        """Fastest growing vibration of a size, given by its logarithm; None where nothing swings."""
         size = float(np.exp(logarithm))
         below = max((swing for swing in known if measure(swing) <= size), key=measure, default=low)
         above = min((swing for swing in known if measure(swing) > size), key=measure, default=high)
@@ -345,6 +348,7 @@ def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: Size
     at_ends = {float(end): float(np.log(abs(swing.root))) for end, swing in zip(ends, known, strict=True)}
 
     def growth(logarithm: float) -> float:
+        """Growth per sample, ln |z|, of the vibration of a size given by its logarithm; -1 where none swings."""
         if logarithm in at_ends:
             return at_ends[logarithm]
         vibration = grown(logarithm)
@@ -437,14 +441,16 @@ class _OpenLoop:
     """The loop cut at its limit, forces in units of it."""
 
     def __init__(self, transition: Floats, force: Floats, rows: Floats) -> None:
+        """Keep transition (M, M), what a force adds (M,), and rows (2, M) that read force and position."""
         self.transition, self.force, self.rows = transition, force, rows
         self.phases = 2.0 * np.pi * np.arange(PHASES) / PHASES
 
     def solve(self, start: Floats, count: int) -> Floats | None:
-        """Newton's method from a start; None where it fails."""
+        """Solution (2 count,) with so many harmonics (see `_longer`), by Newton's method; None where it fails."""
         from scipy.optimize import root
 
         def left(unknown: Floats) -> Floats:
+            """Residuals over the size of the first harmonic: real parts (h,), then imaginary ones."""
             W, angle = _harmonic_parts(unknown, count)
             rest = (self._loop_response(angle, count)[0] * self._limited(W) - W) / abs(W[0])
             return np.concatenate([rest.real, rest.imag])
@@ -462,25 +468,26 @@ class _OpenLoop:
         return force, place, angle
 
     def _loop_response(self, angle: float, count: int) -> Complexes:
-        """(2, h) responses of the commanded force and of the sensor's motion to the force that acts."""
+        """Responses (2, h) of commanded force and sensor's motion to the acting force; angle per sample [rad]."""
         size, orders = len(self.transition), np.arange(1, 2 * count, 2)
         z = np.exp(1j * angle * orders)[:, None, None]
         inner = np.linalg.solve(z * np.eye(size) - self.transition, self.force[:, None].astype(complex))[..., 0]
         return np.asarray(self.rows @ inner.T)
 
     def _over_phases(self, W: Complexes) -> Floats:
+        """Signal over one period (PHASES,) from its odd harmonics W (h,)."""
         orders = np.arange(1, 2 * len(W), 2)
         return np.asarray((W @ np.exp(1j * np.outer(orders, self.phases))).real)
 
     def _limited(self, W: Complexes) -> Complexes:
-        """Harmonics of what the limit lets pass."""
+        """Harmonics (h,) of what the limit lets pass of a force with harmonics W (h,), in units of the limit."""
         passed = np.clip(self._over_phases(W), -1.0, 1.0)
         orders = np.arange(1, 2 * len(W), 2)
         return np.asarray(2.0 / PHASES * np.exp(-1j * np.outer(orders, self.phases)) @ passed)
 
 
 def _harmonic_parts(unknown: Floats, count: int) -> tuple[Complexes, float]:
-    """The harmonics, the first one real, and the angle per sample."""
+    """The harmonics (count,), the first one real, and the angle per sample [rad], of a solution."""
     first = np.exp(unknown[0])
     others = unknown[2 : count + 1] + 1j * unknown[count + 1 :]
     return first * np.concatenate([[1.0 + 0.0j], others]), float(np.exp(unknown[1]))

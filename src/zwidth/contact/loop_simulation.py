@@ -194,6 +194,7 @@ def _offsets(plants: PlantArrays, d: int) -> Floats:
 
 
 def _check(lengths: Floats, substeps: int) -> None:
+    """Raise ValueError for durations [s] that are not positive and finite, or a wrong number of substeps."""
     for length in lengths:
         if not (isfinite(length) and length > 0.0):
             raise ValueError(f"duration must be positive and finite [s], got {float(length)!r}")
@@ -201,7 +202,7 @@ def _check(lengths: Floats, substeps: int) -> None:
 
 
 def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], Ints]:
-    """One apparatus for runs with the same loop and arm, and which run has which."""
+    """One held device for all runs of the same loop, arm and reflex or none, and which run has which (m,)."""
     numbers: dict[tuple[object, ...], int] = {}
     held_devices: list[HeldDevice] = []
     index = []
@@ -216,6 +217,7 @@ def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], Ints]:
 
 
 def _members(runs: Sequence[Run], held_devices: list[HeldDevice], index: Ints, plants: PlantArrays) -> RunArrays:
+    """The runs as arrays for the engine; index (m,) names the device of each."""
     m = len(runs)
     start = np.zeros((m, plants.transition.shape[-2]))
     for i, run in enumerate(runs):
@@ -237,6 +239,7 @@ def _members(runs: Sequence[Run], held_devices: list[HeldDevice], index: Ints, p
 
 
 def _start(held_device: HeldDevice, run: Run) -> tuple[Floats, Floats]:
+    """Coordinates and velocities (n,) at the start of a run. Raises ValueError for other shapes."""
     n = held_device.attached_plant.size
     if run.start is None:
         return run.start_position * held_device.undeformed, run.start_velocity * held_device.undeformed

@@ -76,6 +76,7 @@ class PassivityController:
     counting: Literal["held", "sampled"] = "held"
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a number, or a way of counting, that is not allowed."""
         for name, unit in (("largest_damping", "N s/m"), ("largest_force", "N")):
             value = getattr(self, name)
             if isnan(value) or value <= 0.0:

@@ -50,7 +50,7 @@ class PlantState(NamedTuple):
 
 @compiled
 def motion_from(devices: PlantArrays, start: Floats) -> PlantState:
-    """In the start states."""
+    """The plant's state at a run's start states (R,), no force acting yet."""
     E = devices.kind.shape[1]
     R = start.size
     return PlantState(start.copy(), np.zeros(R), np.zeros(E), np.zeros((E, 4)), np.zeros(R))
@@ -58,7 +58,7 @@ def motion_from(devices: PlantArrays, start: Floats) -> PlantState:
 
 @compiled_inline
 def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
-    """a[row, :count] . b[start:start + count]"""
+    """Dot product a[row, :count] . b[start:start + count]."""
     total = 0.0
     for k in range(count):
         total += a[row, k] * b[start + k]
@@ -92,14 +92,14 @@ def only_coulomb(devices: PlantArrays, d: int) -> bool:
 
 @compiled_inline
 def set_held_increment(inputs: Floats, d: int, part: int, command: float, push: float, held: Floats) -> None:
-    """Change of the states by command and push over a substep."""
+    """Fill held (R,) with the change of the states by command and push [N] over a substep."""
     for i in range(held.size):
         held[i] = inputs[d, part, 0, i] * command + inputs[d, part, 1, i] * push
 
 
 @compiled_inline
 def predict_motions(A: Floats, d: int, part: int, state: PlantState) -> None:
-    """The elements' motions after the substep, if none of them acts."""
+    """Fill in the elements' motions after the substep, as they are if no element acts."""
     for i in range(A.shape[3], A.shape[2]):
         total = state.held_increment[i]
         for k in range(A.shape[3]):
@@ -338,7 +338,7 @@ def bent_spring_force(
 
 @compiled_lean
 def _quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) -> tuple[float, float]:
-    """(V(q1) - V(q0))/(q1 - q0), and about its slope in q1."""
+    """(U(q1) - U(q0))/(q1 - q0) with U as in `bent_spring_force` [N], and about its slope in q1 [N/m]."""
     mean = 0.25 * cubic * (q1 * q1 + q0 * q0) * (q1 + q0)
     slope = 0.25 * cubic * (3.0 * q1 * q1 + 2.0 * q1 * q0 + q0 * q0)
     q0, q1 = q0 - kink, q1 - kink
@@ -473,7 +473,7 @@ def _gap(
     mobility: float,
     h: float,
 ) -> float:
-    """By how much the mean velocity u differs from what the friction at u leaves of the free one."""
+    """By how much the mean velocity u differs from what the friction at u leaves of the free one [m/s]."""
     coulomb, breakaway, slow, stiffness, damping = numbers
     after, mean = bristles_after(z, stribeck(coulomb, breakaway, slow, u), stiffness, u, h)
     return u - free + 0.5 * mobility * (stiffness * mean + damping * (after - z) / h)

@@ -396,6 +396,7 @@ def environment_with_values(
 
 
 def _environment(environment: str | Environment) -> Environment:
+    """The environment itself, or the one of this name or file. Raises ArgumentError."""
     if isinstance(environment, Environment):
         return environment
     check_kind("environment", environment, str)

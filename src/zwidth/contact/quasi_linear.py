@@ -57,12 +57,12 @@ SizeFunction = Callable[[Vibration], float]
 
 
 def amplitude_of(swing: Vibration) -> float:
-    """Size by the amplitude at the sensor."""
+    """Size of a vibration by its amplitude at the sensor [m]."""
     return swing.amplitude
 
 
 def friction_velocity_of(swing: Vibration) -> float:
-    """Size by the velocities at the frictions."""
+    """Size of a vibration by the length of the vector of its velocities at the frictions [m/s]."""
     return float(np.linalg.norm(swing.velocities))
 
 
@@ -96,7 +96,7 @@ class EquivalentLoop:
         return self._swing(root, sizes) if known else None
 
     def seed(self, amplitude: float, angle: float) -> Vibration:
-        """A vibration at an angle per sample, everything moving like the sensor, to start an iteration from."""
+        """A vibration at an angle per sample [rad], all moving like the sensor, to start an iteration from."""
         w, parts = angle / self.loop.period, self.parts
         return Vibration(
             complex(np.exp(1j * angle)),

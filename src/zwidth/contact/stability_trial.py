@@ -71,6 +71,7 @@ class StabilityTrial:
     watch_time: float | None = None
 
     def __post_init__(self) -> None:
+        """Raise ArgumentError for numbers that are not allowed, or a push or disturbance that is too small."""
         for name, value in (("disturbance", self.disturbance), ("visible", self.visible), ("speed", self.speed)):
             if not isfinite(value) or (name != "speed" and value < 0.0):
                 raise ArgumentError(
@@ -175,6 +176,7 @@ def observe(trial: StabilityTrial, walls: ArrayLike, levels: int | None = None) 
 
 
 def _responses(trial: StabilityTrial, walls: Floats, samples: int) -> list[TimeResponse]:
+    """Motions on walls (k, 2) of [stiffness, damping] after the trial's disturbance, for so many samples."""
     environment = one_sided_wall if trial.one_sided else wall
     plant, operator = trial.loop.plant, trial.hand.operator
     shape = least_deforming_motion(plant if operator is None else attach(plant, operator))
@@ -195,7 +197,7 @@ def _responses(trial: StabilityTrial, walls: Floats, samples: int) -> list[TimeR
 
 
 def _bound(trial: StabilityTrial, stiffness: float) -> float:
-    """Beyond it nobody would go on watching [m]: many times what the disturbance and the push move."""
+    """Reading from the wall at which a run stops [m]: many times what the disturbance and the push move."""
     pushed = abs(trial.hand.push) / max(abs(stiffness), 1e-300)
     thrown = abs(trial.speed) * 1024 * trial.loop.period
     return float(BOUND_FACTOR * (trial.disturbance + thrown) + 20.0 * pushed)
@@ -204,7 +206,7 @@ def _bound(trial: StabilityTrial, stiffness: float) -> float:
 def _verdict(
     trial: StabilityTrial, response: TimeResponse, judged: Judgement, level: int, *, last: bool
 ) -> bool | None:
-    """Stable, unstable, or watch on."""
+    """Whether a wall is stable by look `level`, from 0 on; None: watch on. last: there is no other look."""
     if response.given_up or not np.all(np.isfinite(response.truth)):
         return False
     growth = judged.growth

@@ -157,6 +157,7 @@ class TimeResponse(Result):
         return dict(super().table())
 
     def __repr__(self) -> str:
+        """One line with the number of samples, the time [s] and the largest force [N]."""
         largest = float(np.max(np.abs(self.force), initial=0.0))
         given_up = ", stopped early" if self.given_up else ""
         last = float(self.time[-1]) if len(self.time) else 0.0
@@ -263,6 +264,13 @@ def _behaviour(
     moving: bool,
     drifts: bool,
 ) -> Behaviour:
+    """Behaviour of a run.
+
+    touching     (S,)  whether a force acts at a sample
+    third, last  the quarters of the run that are compared
+    growth       logarithm of the last quarter's motion over the third's
+    moving       whether anything moves in the last quarter;   drifts  as in `judge_response`
+    """
     if (response.given_up and not drifts) or not np.all(np.isfinite(response.truth)):
         return "growing"
     inside = float(touching[last].mean())
@@ -299,7 +307,7 @@ def _rms(signal: Floats) -> float:
 
 
 def _half_peak_to_peak(signal: Floats) -> float:
-    """Half of peak to peak."""
+    """Half of a signal's peak to peak, in its unit; nan without samples."""
     return float(np.ptp(signal) / 2.0) if len(signal) else float("nan")
 
 

@@ -248,6 +248,7 @@ def view(typing_context: Any, block: Any, start: Any, shape: Any) -> Any:
     kind = types.Array(block.dtype, len(shape), "C")
     signature = kind(block, types.int64, types.UniTuple(types.int64, len(shape)))
 
+    # writes the machine code: an array structure over the block, its strides from the last axis on
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         given, first, shape_value = arguments
         if isinstance(block, types.Array):
@@ -273,7 +274,7 @@ def view(typing_context: Any, block: Any, start: Any, shape: Any) -> Any:
 
 
 def _view_in_python(block: Any, start: int, shape: tuple[int, ...]) -> Any:
-    """The same of an array, for kernels that run as Python."""
+    """`view` of an array, for kernels that run as Python."""
     return block[start : start + prod(shape)].reshape(shape)
 
 
@@ -326,7 +327,7 @@ def touch_numbers(
     start_velocity: float = 0.0,
     substeps: int = SUBSTEPS,
 ) -> TouchNumbers:
-    """The blocks of one device.
+    """The blocks of numbers of one device, for `touch_step`.
 
     operator        who holds the handle; None: nobody, or the loop's plant has him already
     start_position  of the reading, the device undeformed [m];   start_velocity  the same [m/s]
@@ -430,4 +431,5 @@ def touch_obstacle(loop: Loop) -> str | None:
 
 
 def _sentence(reason: str) -> str:
+    """Sentence: for this reason the server simulates the device instead."""
     return f"{reason[0].upper()}{reason[1:]}, so that the server simulates it instead."

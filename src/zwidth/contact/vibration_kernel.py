@@ -86,7 +86,7 @@ class LoopArrays(NamedTuple):
 
 @compiled
 def held_vibration_response(A: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:
-    """exp(A share), and what an input held over that share of a sample leaves."""
+    """exp(A share) (N, N), and the states (N,) that a unit input through b (N,) leaves, held over that share."""
     N, size = len(A), 0.0
     for i in range(N):
         row = 0.0
@@ -387,7 +387,7 @@ SMALL: Final = 0.25
 
 @compiled_lean
 def multiply(a: Floats, b: Floats, out: Floats) -> None:
-    """out = a b"""
+    """Fill out (N, N) with the product a b."""
     N = a.shape[0]
     for i in range(N):
         for j in range(N):

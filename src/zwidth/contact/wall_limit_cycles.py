@@ -202,6 +202,7 @@ def _simulate_all(
 
 
 def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]:
+    """Stiffest walls by `resting_limit` and `quiet_limit` [N/m]; None where they are not known."""
     if not K > 0.0:
         return None, None
     try:
@@ -212,7 +213,7 @@ def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]
 
 
 def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle) -> list[SimulatedVibration]:
-    """Simulate from both sides of a cycle."""
+    """Simulate the wall K [N/m], B [N s/m] from both sides of a cycle; where each run ends."""
     return _runs(loop, K, B, offset, [share * cycle.amplitude for share in STARTS], cycle.frequency_Hz)
 
 
@@ -245,6 +246,7 @@ def _simulate_large_starts(
 def _runs(
     loop: Loop, K: float, B: float, offset: float, starts: list[float], frequency: float
 ) -> list[SimulatedVibration]:
+    """Simulate a wall from starts [m] off the middle, for CYCLES periods of a frequency [Hz]; where each ends."""
     T = loop.period
     seconds = float(np.clip(CYCLES / frequency, FEWEST * T, MOST * T))
     middle, place = _middle(loop, offset)
@@ -312,6 +314,7 @@ class SimulatedVibration(Documented):
 
 
 def _predicted_tone(cycle: LimitCycle | None) -> dict[str, float] | None:
+    """Amplitude [m] and frequency [Hz] of a predicted cycle by key; None for None."""
     return None if cycle is None else {"amplitude_m": cycle.amplitude, "frequency_Hz": cycle.frequency_Hz}
 
 
@@ -423,6 +426,7 @@ class LimitCyclePrediction(Result):
         return columns
 
     def __repr__(self) -> str:
+        """Lines with the wall, the linear verdict, and each limit cycle up to MOST_TOLD lines."""
         lines = [
             f"  {cycle.amplitude:.4g} m at {cycle.frequency_Hz:.4g} Hz, "
             + ("stable" if cycle.stable else "unstable")
@@ -443,6 +447,7 @@ class LimitCyclePrediction(Result):
 
 
 def _as_cell(value: float | bool) -> float | str:
+    """A value for a table's cell: true or false in words, a number as it is."""
     return str(value).lower() if isinstance(value, bool) else value
 
 

@@ -51,7 +51,8 @@ def buzz_at(point: OperatingPoint, wanted: WantedWall) -> float:
 
 
 def _loudest(point: OperatingPoint, K: float, B: float, offset: float) -> float:
-    """Largest ratio of amplitude and threshold over the stable limit cycles."""
+    """Largest ratio of handle amplitude and threshold over the stable limit cycles on a wall K [N/m], B [N s/m];
+    0 without any, inf where vibration grows beyond the range. offset: its middle as a share of an encoder step."""
     found = predict_limit_cycles(point, K, B, offset=offset, simulate=False)
     kept_up = [cycle for cycle in found.cycles if settles(cycle)]
     if found.leaves_range or (found.verdict == "unstable" and not kept_up):

@@ -54,6 +54,10 @@ def _measure(
     wall: bool | None = None,
     linear: bool | None = None,
 ) -> Measure:
+    """Measure of a group of the catalogue, computed by the function `NAME_at` of the group's file.
+
+    wall, linear  `of_wall` and `linear` of `Measure`; None: as is usual in the group
+    """
     linear = group not in _OF_THE_MECHANISM if linear is None else linear
     function = f"zwidth.measures.{_FILES[group]}:{name}_at"
     of_designs = group in _OF_DESIGNS and not each

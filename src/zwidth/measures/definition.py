@@ -174,6 +174,7 @@ class MeasureValues(Result):
         return {"value": self.values.ravel().tolist(), "status": [STATUS[int(one)] for one in self.status.ravel()]}
 
     def __repr__(self) -> str:
+        """One line: a single point's value, or why it has none; of several the statuses' counts and the span."""
         words = [STATUS[int(one)] for one in self.status.ravel()]
         if len(words) == 1:
             reason = f": {self.notes[0].reason}" if self.notes else ""
@@ -237,7 +238,7 @@ class Measure:
         return replace(self, wall=wall) if self.of_wall else self
 
     def compute(self, point: OperatingPoint) -> Any:
-        """Result of the measure's function; see `evaluate` for values with status."""
+        """Result of the measure's function at a point; see `evaluate` for values with status."""
         function = self.function
         if isinstance(function, str):
             module, _, name = function.partition(":")

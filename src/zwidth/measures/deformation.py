@@ -142,7 +142,7 @@ class _FixedActuatorPlant:
     mode_deformations: Floats
 
     def deformation(self, w: Floats) -> Complexes:
-        """1 - S at angular frequencies w (...) [rad/s]."""
+        """Share of the actuator's motion that deforms the structure, 1 - S (...), at w (...) [rad/s]."""
         s = 1j * np.asarray(w, dtype=np.complex128)[..., None]
         push = s**2 * self.push[0] + s * self.push[1] + self.push[2] + 1j * self.loss_push
         inner = s[..., None] ** 2 * np.eye(len(self.squared_frequencies)) + s[..., None] * self.damping
@@ -203,7 +203,7 @@ def _fix_actuator(plant: Plant) -> _FixedActuatorPlant:
 
 
 def _solve(inner: Complexes, push: Complexes) -> Complexes:
-    """inner^-1 push (..., m); nan where inner is singular, on a resonance without damping."""
+    """Motions inner^-1 push (..., m), of matrices (..., m, m); nan on a resonance without damping."""
     try:
         return np.asarray(np.linalg.solve(inner, push[..., None])[..., 0])
     except np.linalg.LinAlgError:
@@ -237,6 +237,10 @@ def structural_distortion_at(point: OperatingPoint, wanted: WantedWall) -> float
 
 
 def _optimal(point: OperatingPoint, wanted: WantedWall) -> OptimalMass:
+    """Motor-side mass of fastest decay at the wanted wall, in closed form, at all points.
+
+    Raises  MeasureError  where the device breaks what the closed form assumes
+    """
     K, B = wall_of(wanted)
     case = loop_case(point)
     check_assumptions(case, UNDELAYED)
@@ -263,6 +267,7 @@ def first_mode_at(point: OperatingPoint) -> MeasureValues:
 
 
 def _first_mode_at(point: OperatingPoint) -> float:
+    """Least natural frequency above 0 of the plant at a single point [Hz]; inf where nothing bends."""
     frequencies = natural_frequencies(point.ungripped_plant)
     flexible = frequencies[frequencies > 0.0]
     return float(flexible.min()) if len(flexible) else float("inf")

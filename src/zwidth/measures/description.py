@@ -81,12 +81,14 @@ class Description(Result):
         return entries(self.document())
 
     def __repr__(self) -> str:
+        """Lines with masses, stiffness, natural frequencies and dexterity."""
         lines = [*self._masses()]
         if self.manipulability is not None:
             lines.append(f"manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}")
         return "\n  ".join(lines)
 
     def _masses(self) -> Iterator[str]:
+        """Lines with masses [kg], stiffness [N/m] and at most eight natural frequencies [Hz]."""
         felt = self.effective
         if felt is None or self.natural_frequencies is None:
             yield "Description: masses not known"
@@ -128,6 +130,7 @@ def describe(point: OperatingPoint) -> Description:
 
 
 def _describe_beam(link: FlexibleLink, mechanism: Mechanism) -> BeamDescription:
+    """Describe a link that bends: how it is modelled, its masses [kg] and its first frequency [Hz]."""
     beam = link.beam
     return BeamDescription(
         mechanism.links.names[link.link],
@@ -183,6 +186,7 @@ def entries(document: Mapping[str, Any]) -> dict[str, list[Any]]:
 
 
 def _entries(value: Any, key: str) -> Iterator[tuple[str, Any]]:
+    """Every single value within a nested value, with its dotted key, which begins with `key`."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):

@@ -203,29 +203,29 @@ def _without_nan(matrix: ArrayLike) -> tuple[Floats, Flags]:
 
 
 def _ratio(largest: Floats, smallest: Floats) -> Floats:
-    """largest/smallest, inf for 0/0, nan where unknown."""
+    """Condition number (...), largest over smallest value; inf for 0/0, nan where unknown."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = largest / smallest
     return np.asarray(np.where((largest == 0.0) & ~np.isnan(smallest), np.inf, ratio))
 
 
 def manipulability_at(point: OperatingPoint) -> Floats:
-    """Thesis eq. 5.1."""
+    """Manipulability of the drives' Jacobian (thesis eq. 5.1)."""
     return manipulability(jacobian_by_drives(point), _freedoms(point))
 
 
 def isotropy_at(point: OperatingPoint) -> Floats:
-    """Thesis eq. 5.2, 2-norm."""
+    """Condition number of the drives' Jacobian (thesis eq. 5.2, 2-norm)."""
     return isotropy(jacobian_by_drives(point), _freedoms(point))
 
 
 def isotropy_frobenius_at(point: OperatingPoint) -> Floats:
-    """Thesis eq. 5.2, Frobenius norm, 1 where isotropic."""
+    """Condition number of the drives' Jacobian (thesis eq. 5.2, Frobenius norm), 1 where isotropic."""
     return isotropy_frobenius(jacobian_by_drives(point), _freedoms(point))
 
 
 def dynamic_manipulability_at(point: OperatingPoint) -> Floats:
-    """Thesis eq. 5.3, links and rotors."""
+    """Dynamic manipulability with links and rotors (thesis eq. 5.3)."""
     return dynamic_manipulability(jacobian_by_drives(point), _driven_mass(point), _freedoms(point))
 
 
@@ -240,22 +240,22 @@ def handle_mass_isotropy_at(point: OperatingPoint) -> Floats:
 
 
 def link_side_mass_at(point: OperatingPoint) -> Floats:
-    """Of the links, along the rendered direction with the drives cut."""
+    """Mass of the links along the rendered direction with the drives cut [kg]."""
     return point.effective.link_side_mass
 
 
 def motor_side_mass_at(point: OperatingPoint) -> Floats:
-    """Of the rotors, along the rendered direction with the drives cut."""
+    """Mass of the rotors along the rendered direction with the drives cut [kg]."""
     return point.effective.motor_side_mass
 
 
 def rigid_mass_at(point: OperatingPoint) -> Floats:
-    """Of links and rotors, along the rendered direction with rigid drives."""
+    """Mass of links and rotors along the rendered direction with rigid drives [kg]."""
     return point.effective.rigid_mass
 
 
 def stiffness_at(point: OperatingPoint) -> Floats:
-    """Of the drives, along the rendered direction; inf with rigid ones."""
+    """Stiffness of the drives along the rendered direction [N/m]; inf with rigid ones."""
     return point.effective.stiffness
 
 
@@ -278,4 +278,5 @@ def _driven_mass(point: OperatingPoint) -> Floats:
 
 
 def _freedoms(point: OperatingPoint) -> int:
+    """Number of directions in which the drives can move the handle, at most 3."""
     return min(3, point.drive_side.driven)

@@ -152,6 +152,7 @@ def _same_status(point: OperatingPoint, status: int, reason: str) -> MeasureValu
 
 
 def _note(points: Flags, status: int, reason: str) -> Note:
+    """Note with this status and reason about the marked points (...)."""
     return Note(status, reason, int(points.sum()), tuple(int(i) for i in np.argwhere(points)[0]))
 
 
@@ -242,4 +243,5 @@ def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
 
 
 def _error_text(error: BaseException) -> str:
+    """Reason for a point without value: the type of the error and its first line."""
     return f"raised {type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'without a message'}"

@@ -120,6 +120,7 @@ class FeltWall(Result):
         }
 
     def __repr__(self) -> str:
+        """Lines with the wall's verdict, what is felt at rest, of the stiffest wall and in free motion."""
         stiffest = "no stable wall has K > 0 and B >= 0"
         if self.stiffness_max is not None:
             felt = f"felt with {self.static_stiffness_at_stiffness_max:.4g} N/m"
@@ -139,6 +140,7 @@ class FeltWall(Result):
 
 
 def _impedance_columns(name: str, impedance: Complexes) -> dict[str, Floats]:
+    """Real and imaginary part of an impedance (k,) [N s/m] as two columns."""
     return {f"{name}_real_Ns_per_m": impedance.real, f"{name}_imag_Ns_per_m": impedance.imag}
 
 
@@ -223,7 +225,7 @@ def _felt_at_rest(
 
 
 def _law(controller: Controller, theta: Floats) -> tuple[Complexes, Complexes]:
-    """Force filter with software's delay, and velocity estimate, at angles (k,)."""
+    """Responses (k,) of force filter with software's delay, and of velocity estimate [1/s], at angles (k,)."""
     z, d = np.exp(1j * theta), np.expm1(1j * theta)
     force, speed = force_filter(controller), velocity_estimator(controller)
     passed = factor_response(force.numerator, force.denominator, d) * z ** -round(controller.delay)
@@ -232,7 +234,7 @@ def _law(controller: Controller, theta: Floats) -> tuple[Complexes, Complexes]:
 
 
 def _handle_motion(paths: dict[str, Complexes], law: Complexes) -> Complexes:
-    """x_h/f (k,) [m/N] with a wall of this response."""
+    """Handle motion per hand force, x_h/f (k,) [m/N], with a wall of response `law` (k,) [N/m]."""
     return np.asarray(paths["hh"] - paths["ha"] * law * paths["sh"] / (1.0 + paths["P"] * law))
 
 
@@ -252,7 +254,7 @@ def _motion_deviation(
 
 
 def _stiffness_and_mass(omega: Floats, motion: Complexes, deviation: Floats) -> tuple[float, float]:
-    """k and m of  Re S = k - m w^2 + c w^4  of the dynamic stiffness S = 1/motion at low frequencies; nan for what
+    """k [N/m] and m [kg] of  Re S = k - m w^2 + c w^4,  S = 1/motion the dynamic stiffness at low w; nan for what
     is uncertain by more than UNCERTAIN of it."""
     clear = deviation < CLEAR * np.abs(motion)
     if np.count_nonzero(clear) < FEWEST:
@@ -333,6 +335,7 @@ PIECE = 1e-3
 
 
 def _felt_arcs(arcs: tuple[BoundaryArc, ...]) -> list[dict[str, Floats]]:
+    """Arcs of a boundary by key and unit, where their stiffness is the felt one."""
     return [
         {"felt_stiffness_N_per_m": arc.stiffness, "damping_Ns_per_m": arc.damping, "frequency_Hz": arc.frequency}
         for arc in arcs
@@ -367,6 +370,7 @@ class FeltChart(Result):
         }
 
     def __repr__(self) -> str:
+        """One line with the felt stiffness of the stiffest stable wall and its limit [N/m]."""
         hardest = (
             f"hardest felt contact {self.stiffness_max:.6g} N/m"
             if isfinite(self.stiffness_max)
@@ -420,6 +424,6 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
 
 
 def _runs(inside: Flags) -> list[slice]:
-    """Runs of at least two True values."""
+    """Slices of `inside` (k,) that hold a run of at least two True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]

@@ -197,7 +197,7 @@ def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, Flag
 
 
 def _torques_per_force(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
-    """h = J^T u (..., d)."""
+    """Drive torques per force along a direction, h = J^T u (..., d) [N m/N]."""
     J, u = np.asarray(jacobian, dtype=np.float64), _directions(direction)
     return np.asarray(np.einsum("...i,...id->...d", u, J))
 
@@ -285,6 +285,7 @@ def _torques(point: OperatingPoint, key: str) -> Floats:
 
 
 def _check_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
+    """The values (d,) of this key of the drives. Raises MeasureError where one is not finite, as if left out."""
     missing = ~np.isfinite(values)
     if missing.any():
         first = int(np.argwhere(missing)[0][-1])
@@ -293,11 +294,12 @@ def _check_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
 
 
 def _check_nonzero(value: float, otherwise: str) -> Floats:
-    """A number of a [plant]. Raises MeasureError where it is 0, as it is if the file leaves it out."""
+    """A number of a [plant]. Raises MeasureError, saying `otherwise`, where it is 0, as if left out."""
     if value == 0.0:
         raise MeasureError(otherwise)
     return np.asarray(value)
 
 
 def _key(point: OperatingPoint, drive: int, key: str) -> str:
+    """Key in the device file of a number of a drive, given by its index."""
     return f"mechanism.drives.{point.drives.names[drive]}.{key}"

@@ -70,7 +70,7 @@ def segment_distance(first: ArrayLike, last: ArrayLike, other_first: ArrayLike, 
 
 
 def _to_segment(point: Floats, start: Floats, along: Floats) -> Floats:
-    """Distance of points to segments from their start along their whole vector."""
+    """Distances (...) [m] of points to segments, each given by its start and the vector to its end (..., 3)."""
     length = np.sum(along * along, axis=-1)
     share = np.sum((point - start) * along, axis=-1) / np.maximum(length, SHORT)
     at = np.clip(share, 0.0, 1.0)[..., None]
@@ -146,6 +146,7 @@ def neighbours(mechanism: Mechanism) -> set[tuple[int, int]]:
     pairs = set[tuple[int, int]]()
 
     def add(one: int, other: int) -> None:
+        """Add a pair of bodies, unless they are one or one of them is the base."""
         if one >= 0 and other >= 0 and one != other:
             pairs.add((min(one, other), max(one, other)))
 
@@ -218,6 +219,7 @@ def largest_distance(mechanism: Mechanism, posture: Posture, axes: Sequence[int]
     design = design_of_each(mechanism, shape)
 
     def of_design(points: Floats) -> Floats:
+        """Points (..., 3) at all postures, from those of each design."""
         return np.asarray(per_design(mechanism, points, 1)[design].reshape(*shape, 3))
 
     grounded = [of_design(links.origin[..., i, :]) for i in np.flatnonzero(links.parent < 0)]
@@ -294,7 +296,7 @@ def reciprocal_condition(
 
 
 def _homogeneous(T: Floats, R: Floats) -> Floats:
-    """[T/L; R] (..., 6, d) with the characteristic length of the Frobenius norm; nan where J is."""
+    """[T/L; R] (..., 6, d) of T, R (..., 3, d), L the characteristic length (Frobenius norm); nan where one is."""
     J = np.concatenate([T, R], axis=-2)
     unknown: Flags = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     inverse = np.linalg.pinv(np.where(unknown[..., None, None], 0.0, J))
@@ -339,21 +341,22 @@ def reach_at(point: OperatingPoint) -> Floats:
 
 
 def reach_x_at(point: OperatingPoint) -> Floats:
-    """The same along x alone [m]."""
+    """Largest distance of any point of a link from the middle of the base along x [m]."""
     return _reach(point, (0,))
 
 
 def reach_y_at(point: OperatingPoint) -> Floats:
-    """The same along y alone [m]."""
+    """Largest distance of any point of a link from the middle of the base along y [m]."""
     return _reach(point, (1,))
 
 
 def reach_z_at(point: OperatingPoint) -> Floats:
-    """The same along z alone [m]."""
+    """Largest distance of any point of a link from the middle of the base along z [m]."""
     return _reach(point, (2,))
 
 
 def _reach(point: OperatingPoint, axes: tuple[int, ...]) -> Floats:
+    """Largest distance of a point of a link from the base's middle along these axes [m]. Raises MeasureError."""
     mechanism, posture = _mechanism(point)
     with _links_of_a_length():
         return largest_distance(mechanism, posture, axes)
@@ -361,7 +364,7 @@ def _reach(point: OperatingPoint, axes: tuple[int, ...]) -> Floats:
 
 @contextmanager
 def _links_of_a_length() -> Iterator[None]:
-    """Say what to give where no link has a length."""
+    """Within it a NoAnswerError becomes a MeasureError that says what to give where no link has a length."""
     try:
         yield
     except NoAnswerError:
@@ -369,6 +372,7 @@ def _links_of_a_length() -> Iterator[None]:
 
 
 def _mechanism(point: OperatingPoint) -> tuple[Mechanism, Posture]:
+    """Mechanism and posture of a point. Raises NoMechanismError for a device without a mechanism."""
     if point.mechanism is None or point.posture is None:
         raise NoMechanismError
     return point.mechanism, point.posture

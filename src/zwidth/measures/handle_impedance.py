@@ -76,7 +76,7 @@ LEAVE_OUT: Final = "leave the load out"
 
 
 def check_no_local_loop(controller: Controller) -> None:
-    """Raise FeedbackError for a computer of two rates."""
+    """Raise FeedbackError for a computer with a local loop, which has a sampling rate of its own."""
     two_rates = replace(controller, force_sensor=None, feedforward=None)
     check_no_feedback(two_rates, UNKNOWN, "leave local_loop out")
 
@@ -126,7 +126,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
 
 
 def _controlled_impedance(loop: Loop, wall: Complexes, s: Complexes) -> Complexes:
-    """`felt_impedance` with feedforward and a force sensor, at s = jw (...) for a wall C (...)."""
+    """`felt_impedance` [N s/m] with feedforward and a force sensor, at s = jw (...) for a wall C (...) [N/m]."""
     plant, T, computer = loop.plant, loop.period, loop.controller
     dynamic, act, read, h = _dynamic_stiffness(plant, s)
     z, d, hold = np.exp(s * T), np.expm1(s * T), _hold_response(loop, s)
@@ -163,7 +163,7 @@ def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complexes:
 
 
 def free_impedance(loop: Loop, frequency: ArrayLike) -> Complexes:
-    """The same of a loop, with its computer's fixed feedback. Raises FeedbackError with a local loop."""
+    """Force over velocity at a loop's handle without a wall [N s/m]. Raises FeedbackError with a local loop."""
     if loop.has_fixed_feedback:
         return felt_impedance(loop, 0.0, 0.0, frequency)
     return free_motion_impedance(loop.plant, frequency)
@@ -263,7 +263,7 @@ def free_motion_mass(plant: Plant, controller: Controller | None = None) -> floa
 
 
 def handle_of(plant: Plant) -> Floats:
-    """The plant's handle. Raises HandleError if it has none, FeedbackError under load."""
+    """The plant's handle (n,). Raises HandleError if it has none, FeedbackError under load."""
     check_no_load(plant, UNKNOWN, LEAVE_OUT)
     if plant.handle is None:
         raise HandleError(
@@ -292,7 +292,7 @@ def _solve(matrices: Complexes, right: Floats) -> Complexes:
 
 
 def _hold_response(loop: Loop, s: Complexes) -> Complexes:
-    """H, from commands to the part of the force at s itself."""
+    """Response H (...) from commands to the part of the held force at s = jw (...) itself."""
     controller, T = loop.controller, loop.period
     numerator, denominator = (
         np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(controller.force_filter, T)
@@ -303,7 +303,7 @@ def _hold_response(loop: Loop, s: Complexes) -> Complexes:
 
 
 def _sampled(loop: Loop, log_z: Complexes) -> tuple[Complexes, Complexes]:
-    """P and w at z = exp(log_z)."""
+    """Responses of the sampled plant, P [m/N], and of the velocity estimate, w [1/s], at z = exp(log_z) (...)."""
     z, d = np.exp(log_z), np.expm1(log_z)
     return loop.plant_response(z, d), loop.velocity_response(z, d)
 
@@ -398,7 +398,7 @@ def _free_part(vector: Floats, free: Flags) -> Floats:
 
 
 def _slips(h: Floats, s: Floats, a: Floats, g: float, q: float) -> bool:
-    """Whether the handle moves along free motions while the wall holds the sensor."""
+    """Whether the handle h moves along free motions while the wall, acting along a, holds the sensor s; (n,)."""
     left, right = h - g * s, h - q * a
     slip, size = float(left @ right), float(np.linalg.norm(left) * np.linalg.norm(right))
     own = float(np.linalg.norm(h))
@@ -410,6 +410,10 @@ def _slips(h: Floats, s: Floats, a: Floats, g: float, q: float) -> bool:
 
 
 def _held(h: Floats, s: Floats, a: Floats, g: float, q: float, spring: Floats) -> float:
+    """Compliance [m/N] that is left while the wall holds the sensor, sum of (h - g s)(h - q a)/spring over modes.
+
+    0 where rounding of the modes could have made it.
+    """
     left, right = _difference(h, g * s), _difference(h, q * a)
     of_left, of_right = np.maximum(np.abs(h), np.abs(g * s)), np.maximum(np.abs(h), np.abs(q * a))
     blur = OF_MODES * float(np.sum((of_left * np.abs(right) + np.abs(left) * of_right) / spring))

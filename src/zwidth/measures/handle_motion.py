@@ -103,7 +103,7 @@ class HandleMotion:
         return G, G - H * C * through / (1.0 + P * C)
 
     def _some(self, rows: Ints, frequency: Floats) -> tuple[Complexes, ...]:
-        """G_hh, G_ha G_sh, P, w and H of devices (n,) at frequencies (n, f)."""
+        """G_hh, G_ha G_sh, P, w and H (see above), each (n, f), of devices (n,) at frequencies (n, f) [Hz]."""
         T = self.period[rows][:, None]
         s: Complexes = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
         G_hh, G_ha, G_sh = self._responses(rows, s)
@@ -112,7 +112,7 @@ class HandleMotion:
         return G_hh, G_ha * G_sh, P, w, self._hold(rows, s)
 
     def _responses(self, rows: Ints, s: Complexes) -> tuple[Complexes, ...]:
-        """G_hh, G_ha and G_sh (n, f)."""
+        """Responses G_hh, G_ha and G_sh (n, f) [m/N] of devices (n,) at s = jw (n, f)."""
         modes = self.modes.rows(rows)
         h, a, y = modes.handle, modes.input, modes.output
         own = s[..., None] ** 2 + 2.0 * modes.decay[:, None] * s[..., None] + modes.frequency_squared[:, None]
@@ -131,7 +131,7 @@ class HandleMotion:
         return tuple(G)
 
     def _hold(self, rows: Ints, s: Complexes) -> Complexes:
-        """H (n, f), from commands to the part of the force at s itself."""
+        """Response H (n, f) of devices (n,) from commands to the part of the held force at s (n, f) itself."""
         T = self.period[rows][:, None]
         delay, lag = self.delay[rows][:, None], self.lag[rows][:, None]
         low_pass, d = force_filter(self.controller), np.expm1(s * T)
@@ -146,15 +146,16 @@ class HandleMotion:
 
     @property
     def delay(self) -> Floats:
-        """(N,) of the force [samples]."""
+        """Delay of the force (N,) [samples]."""
         return self._of_each(self.controller.delay)
 
     @property
     def lag(self) -> Floats:
-        """(N,) of the actuator [s]."""
+        """Time constant of the actuator (N,) [s]."""
         return self._of_each(self.controller.actuator_time_constant)
 
     def _of_each(self, number: float | Floats) -> Floats:
+        """A number of all devices, or that of each, as an array (N,)."""
         return np.array(np.broadcast_to(np.ravel(np.asarray(number, dtype=np.float64)), self.period.shape))
 
     def _quadratic(self, c: Floats, rows: Ints, d: Complexes) -> Complexes:
@@ -222,7 +223,10 @@ def frequencies_in_band(
 
 
 def _zeros(w2: Floats, h2: Floats) -> list[Floats]:
-    """Antiresonances (n, 1) between neighbouring resonances [rad/s], by halving: the sum rises between them."""
+    """Antiresonances (n, 1) between neighbouring resonances [rad/s], by halving: the sum rises between them.
+
+    w2, h2  (n, m)  squared resonances, ascending, and squared shares of the handle in these modes
+    """
     found = []
     for k in range(w2.shape[1] - 1):
         low, high = w2[:, k].copy(), w2[:, k + 1].copy()
@@ -279,6 +283,7 @@ def felt_stiffness_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -
     refuse = _check_frequencies(point, frequency)
 
     def alone(at: Index) -> float:
+        """Felt stiffness at the point of an index [N/m]."""
         refuse(at)
         loop, verdicts = _free_loop(point[at]), judge(point[at].loop, [K[at]], [B[at]])
         if verdicts.verdict[0] != STABLE:
@@ -305,6 +310,7 @@ def rate_hardness_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) ->
     K, B = numbers_of(wanted, point.shape, "a wanted wall", "stiffness", "damping")
 
     def alone(at: Index) -> float:
+        """Rate-hardness at the point of an index [N/m]."""
         loop, verdicts = _free_loop(point[at]), judge(point[at].loop, [K[at]], [B[at]])
         if verdicts.verdict[0] != STABLE:
             raise NoValueError(_not_felt(int(verdicts.verdict[0])))
@@ -339,6 +345,7 @@ def free_motion_force_at(point: OperatingPoint, wanted: WantedWall | WantedWalls
     (frequency,) = numbers_of(wanted, point.shape, HAND, "frequency")
 
     def alone(at: Index) -> float:
+        """Size of the free impedance at the point of an index [N s/m]."""
         return float(np.abs(free_impedance(_free_loop(point[at]), frequency[at])))
 
     known, motion = np.full(point.shape, np.nan), HandleMotion.of(point)
@@ -359,6 +366,7 @@ def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
     _check_band(point, low, high)
 
     def alone(at: Index) -> float:
+        """Least impedance ratio at the point of an index."""
         loop, peak = _free_loop(point[at]), largest_stiffness(point[at].loop, float(radius[at]))
         if peak is None:
             raise NoValueError(NO_WALL_DECAYS)
@@ -374,6 +382,7 @@ def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
     top = np.minimum(high.ravel()[rows], HIGHEST / motion.period[rows])
 
     def ratio(frequency: Floats) -> Floats:
+        """Impedance felt at the wall over that in free motion (n, k), at frequencies (n, k) [Hz]."""
         free, held = motion.compliances(rows, frequency, K, B)
         return np.asarray(np.abs(free / held))
 
@@ -387,11 +396,13 @@ def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
 
 
 def _below_half(frequency: float, period: float) -> float:
+    """A frequency, cut to the highest that is looked at below half the sampling frequency [Hz]."""
     return min(frequency, HIGHEST / period)
 
 
 def _ratio_alone(loop: Loop, K: float, B: float, low: float, high: float) -> float:
-    """Of one loop, tried at many frequencies: its modes may have no real form."""
+    """Least impedance ratio of one loop on a wall K [N/m], B [N s/m] over a band [Hz], tried at many frequencies:
+    its modes may have no real form."""
     roots = eigenvalues(loop, K, B).ravel()
     centres, wide = np.abs(np.angle(roots)), -np.log(np.clip(np.abs(roots), 1e-3, 1.0))
     beside = [centres + side * np.minimum(wide, 0.3 * centres) for side in (-2.0, -0.5, 0.0, 0.5, 2.0)]
@@ -399,6 +410,7 @@ def _ratio_alone(loop: Loop, K: float, B: float, low: float, high: float) -> flo
     frequency = np.sort(np.concatenate([np.geomspace(low, high, 2000), extra]))[None]
 
     def ratio(f: Floats) -> Floats:
+        """Impedance felt at the wall over that in free motion (1, k), at frequencies (1, k) [Hz]."""
         held, free = felt_impedance(loop, K, B, f), free_impedance(loop, f)
         return np.asarray(np.abs(held / free))
 
@@ -413,12 +425,14 @@ def _check_frequencies(point: OperatingPoint, frequency: Floats) -> Callable[[In
     half = np.broadcast_to(0.5 / np.asarray(point.controller.sampling_period, dtype=np.float64), point.shape)
 
     def text(at: Index) -> str:
+        """Message: the frequency at this index is too high."""
         return f"needs a frequency below half the sampling frequency, {half[at]:g} Hz, got {frequency[at]:g} Hz"
 
     if np.all(frequency >= half):
         raise MeasureError(text(tuple(0 for _ in point.shape)))
 
     def refuse(at: Index) -> None:
+        """Raise NoValueError where the frequency at this index is too high."""
         if frequency[at] >= half[at]:
             raise NoValueError(text(at))
 
@@ -441,6 +455,7 @@ def _check_band(point: OperatingPoint, low: Floats, high: Floats) -> None:
 
 
 def _not_felt(verdict: int) -> str:
+    """Reason why a wall of this verdict has no felt impedance."""
     return f"the wanted wall is {NAMES[verdict]} here, so that there is no steady motion to feel"
 
 

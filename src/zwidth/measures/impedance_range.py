@@ -54,6 +54,7 @@ def stiffness_max_with_margins_at(point: OperatingPoint, wanted: WantedWall | Wa
     margins = numbers_of(wanted, point.shape, "margins in stiffness, damping and delay", *names)
 
     def alone(at: Index) -> float:
+        """Largest stiffness at the point of an index [N/m], by loops with delays spread over the margin."""
         stiffness, damping, delay = (float(margin[at]) for margin in margins)
         loop, count = point[at].loop, delays_within(delay)
         computer = loop.controller
@@ -180,14 +181,17 @@ def sprung_range(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLi
 
 
 def _broadcast(*values: ArrayLike) -> tuple[Floats, ...]:
+    """The values as arrays of floats, all of one shape."""
     return tuple(np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in values)))
 
 
 def _positive(values: Floats) -> Flags:
+    """Which values (...) are positive and finite."""
     return (values > 0.0) & np.isfinite(values)
 
 
 def _masked_range(applies: Flags, *numbers: Floats) -> ImpedanceRange:
+    """Range of these numbers, in the order of its fields; nan where the closed form does not apply."""
     return ImpedanceRange(*(np.where(applies, number, np.nan) for number in numbers))
 
 
@@ -208,6 +212,7 @@ def stiffness_max_decaying_at(point: OperatingPoint, wanted: WantedWall | Wanted
     (radius,) = numbers_of(wanted, point.shape, what, "spectral_radius")
 
     def alone(at: Index) -> float:
+        """Largest stiffness of decaying walls at the point of an index [N/m]."""
         peak = largest_stiffness(point[at].loop, float(radius[at]))
         if peak is None:
             raise NoValueError(NONE_DECAYS)
@@ -244,7 +249,7 @@ def _computed(
     """A number of all points' charts, computed together (`chart.point_chart`), and of a point in doubt, or of a
     device whose modes are not in that form, by the chart of each alone.
 
-    number       attribute of `ChartNumbers`
+    what         what of the charts is computed;   number  attribute of `ChartNumbers`;   alone  of a single point
     none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
     """
     numbers = numbers_of_points(point, what)
@@ -255,6 +260,7 @@ def _computed(
 
 
 def _stiffness_max_at(point: OperatingPoint) -> float:
+    """Largest stiffness at a single point [N/m]. Raises NoValueError where no wall is stable."""
     peak = largest_stiffness(point.loop)
     if peak is None:
         raise NoValueError(NONE_STABLE)
@@ -262,14 +268,17 @@ def _stiffness_max_at(point: OperatingPoint) -> float:
 
 
 def _damping_max_at(point: OperatingPoint) -> float:
+    """Largest damping at a single point [N s/m]."""
     return stability_chart(point.loop, decay=False).damping_max
 
 
 def _stable_area_at(point: OperatingPoint) -> float:
+    """Stable area at a single point [N² s/m²]."""
     return stability_chart(point.loop, decay=False).stable_area
 
 
 def _fastest_decay_at(point: OperatingPoint) -> float:
+    """Least spectral radius at a single point. Raises NoValueError where no wall is stable."""
     wall = stability_chart(point.loop).fastest_decay
     if wall is None:
         raise NoValueError("no wall is stable")
@@ -280,21 +289,25 @@ _NONE = "no wall of positive stiffness is stable, or the mass or the spring of t
 
 
 def stiffness_max_closed_form_at(point: OperatingPoint) -> MeasureValues:
-    """Thesis eq. 5.4, 5.6 and 5.7."""
+    """Largest stiffness in closed form [N/m] (thesis eq. 5.4, 5.6 and 5.7)."""
     return with_status(point, _range(point).stiffness_max, _NONE)
 
 
 def damping_max_closed_form_at(point: OperatingPoint) -> MeasureValues:
-    """Thesis eq. 5.4, 5.6 and 5.7, for stiffnesses near 0."""
+    """Largest damping for stiffnesses near 0 in closed form [N s/m] (thesis eq. 5.4, 5.6 and 5.7)."""
     return with_status(point, _range(point).damping_max, _NONE)
 
 
 def stable_area_closed_form_at(point: OperatingPoint) -> MeasureValues:
-    """Thesis eq. 5.5 and 5.8."""
+    """Stable area in closed form [N² s/m²] (thesis eq. 5.5 and 5.8)."""
     return with_status(point, _range(point).stable_area, _NONE)
 
 
 def _range(point: OperatingPoint) -> ImpedanceRange:
+    """Range in closed form at all points: of a rigid mass, or of the motor side on the structure's spring.
+
+    Raises  MeasureError  for another model, or one that breaks what the closed form assumes
+    """
     if point.operator is not None and point.model != "motor-mass":
         raise MeasureError("has a closed form for the device alone", [("operator", "none")])
     case = loop_case(point)

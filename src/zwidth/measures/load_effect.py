@@ -39,7 +39,7 @@ def load_change(point: OperatingPoint) -> float:
 
 
 def without_load(point: OperatingPoint) -> OperatingPoint:
-    """The same posture with nothing that pushes."""
+    """The operating point in the same posture, with no load that pushes."""
     return point if point.load is None else replace(point, load=None)
 
 

@@ -89,7 +89,7 @@ def loop_case(point: OperatingPoint) -> ConditionCase:
 
 
 def check_assumptions(case: ConditionCase, *more: str) -> None:
-    """Raises MeasureError, with the assumptions in words, where a loop does not meet those of the closed forms.
+    """Raises MeasureError, in words, where a loop breaks an assumption of the closed forms, or one of `more`.
 
     Closed forms assume the velocity by backward difference and the force as computed; their assumption that
     nothing is damped is not checked.

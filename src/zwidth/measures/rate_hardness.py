@@ -103,7 +103,7 @@ def _several(
     first: int,
     last: int,
 ) -> None:
-    """Devices first to last - 1, one after the other."""
+    """Fill out[first:last] with the steepest mean rates of these devices, one after the other."""
     m = w2.shape[1]
     n = 2 * m + 2
     A, E, F = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
@@ -139,7 +139,7 @@ def _steepest(
     past: Floats,
     memory: Floats,
 ) -> float:
-    """The steepest mean rate of one device, v = 1; `modes` as w2, drag, h, a and s."""
+    """The steepest mean rate of one device [N/m], v = 1; `modes` as w2, drag, h, a and s."""
     w2, drag, h, a, s = modes
     m, T = len(w2), loops.period[c]
     whole = loops.whole_delay[c]
@@ -195,7 +195,7 @@ def _steepest(
 
 @compiled_lean
 def _generator(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, lag: float, A: Floats) -> None:
-    """d/dt of x, x', the actuator's force and the commanded one, with the handle held."""
+    """Fill A with d/dt of the state: x, x', the actuator's force and the commanded one, with the handle held."""
     m = len(w2)
     n = 2 * m + 2
     for i in range(n):
@@ -220,7 +220,7 @@ def _generator(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, lag: f
 
 @compiled_lean
 def _exponential(A: Floats, time: float, m: int, out: Floats, work: Floats) -> None:
-    """exp(A time), by its series after halving and by squaring; velocities are taken in metres per `time`."""
+    """Fill out with exp(A time), by its series after halving and by squaring; velocities in metres per `time`."""
     n = A.shape[0]
     M, term, other = work[0], work[1], work[2]
     norm = 0.0
@@ -256,6 +256,7 @@ def _exponential(A: Floats, time: float, m: int, out: Floats, work: Floats) -> N
             out[i, j] *= (time if m <= j < 2 * m else 1.0) / (time if m <= i < 2 * m else 1.0)
 
 
+# fills out (n, n) with the product A B
 @compiled_lean
 def _multiply(A: Floats, B: Floats, out: Floats) -> None:
     n = A.shape[0]
@@ -269,7 +270,7 @@ def _multiply(A: Floats, B: Floats, out: Floats) -> None:
 
 @compiled_lean
 def _step(E: Floats, state: Floats, after: Floats) -> None:
-    """The state one piece later."""
+    """Move the state one piece on, by its transition E; `after` is working memory."""
     n = len(state)
     for i in range(n):
         value = 0.0
@@ -282,7 +283,7 @@ def _step(E: Floats, state: Floats, after: Floats) -> None:
 
 @compiled_lean
 def _force(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, state: Floats) -> float:
-    """Force that the hand feels beyond that of free motion."""
+    """Force that the hand feels beyond that of free motion [N], from a state of `_generator`."""
     m, force = len(w2), 0.0
     for i in range(m):
         own = w2[i] * state[i] - a[i] * state[2 * m]
@@ -294,7 +295,7 @@ def _force(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, state: Flo
 
 @compiled_lean
 def _estimate(loops: LoopTable, c: int, y: float, past: Floats, memory: Floats) -> float:
-    """Velocity estimate after another reading."""
+    """Velocity estimate of computer c after another reading y; `past` and `memory` are moved on."""
     count = loops.window_count[c]
     for j in range(count - 1, 0, -1):
         past[j] = past[j - 1]
@@ -309,7 +310,7 @@ def _estimate(loops: LoopTable, c: int, y: float, past: Floats, memory: Floats) 
 
 @compiled_lean
 def _filtered(loops: LoopTable, c: int, lagging: int, force: float, memory: Floats) -> float:
-    """A command through the filter of the force; the actuator's lag, the last factor, is not the computer's."""
+    """A command [N] through the force filter; the actuator's lag, the last factor if `lagging`, is left out."""
     before, value = loops.velocity.shape[1], force
     for k in range(loops.force_count[c] - lagging):
         value = _through(loops.force[c, k], value, memory[before + k])

@@ -36,6 +36,7 @@ SHOWN: Final = 4  # crossings that a repr names
 
 
 def _parts(z: Any) -> dict[str, Any]:
+    """Real and imaginary part by key."""
     return {"real": z.real, "imag": z.imag}
 
 
@@ -88,6 +89,7 @@ class EigenvaluePaths(Result):
         }
 
     def __repr__(self) -> str:
+        """Lines with the number of paths, the range of the values, and where paths cross the unit circle."""
         paths = self.eigenvalues.shape[1]
         lines = [f"EigenvaluePaths: {paths} paths over values from {self.values[0]:g} to {self.values[-1]:g}"]
         ways = {True: "out of", False: "into"}
@@ -163,6 +165,7 @@ class _PathTracer:
     """Values and matched eigenvalues so far."""
 
     def __init__(self, matrix_at: Callable[[float], ArrayLike], requested: Floats) -> None:
+        """Trace the eigenvalues of `matrix_at` over the requested values (k,)."""
         self.matrix_at = matrix_at
         first = float(requested[0])
         self.steps = [(first, self.eigenvalues_at(first))]
@@ -172,14 +175,14 @@ class _PathTracer:
         self.z: Complexes = np.array([z for _, z in self.steps])
 
     def eigenvalues_at(self, value: float) -> Complexes:
-        """Eigenvalues in any order."""
+        """Eigenvalues (N,) of the matrix at a value, in any order."""
         matrix = np.asarray(self.matrix_at(value), dtype=np.float64)
         if not np.all(np.isfinite(matrix)):
             raise NoAnswerError(f"the transition matrix at {value:g} is not finite")
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
     def trace_to(self, end: float, unordered: Complexes, halvings: int) -> None:
-        """Step from the last value to `end`."""
+        """Add the eigenvalues at `end`, given unordered, and steps between while the match is uncertain."""
         start, z = self.steps[-1]
         if len(z) != len(unordered):
             raise NoAnswerError(
@@ -213,6 +216,7 @@ class _PathTracer:
         (low, high), (z_low, z_high) = self.values[at : at + 2].tolist(), self.z[at : at + 2, path].tolist()
 
         def here(value: float) -> complex:
+            """Eigenvalue of the path at a value between the two steps."""
             # the match is certain: between its ends nothing else is as near to the straight line
             z = self.eigenvalues_at(value)
             line = z_low + (z_high - z_low) * (value - low) / (high - low)
@@ -225,7 +229,7 @@ class _PathTracer:
 
 
 def _match(z: Complexes, others: Complexes) -> tuple[Complexes, bool]:
-    """`others` in the order of z, and whether the match is certain."""
+    """`others` (N,) in the order of z (N,), so that all together move least, and whether the match is certain."""
     from scipy.optimize import linear_sum_assignment
 
     distance = np.abs(z[:, None] - others)

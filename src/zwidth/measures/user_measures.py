@@ -51,11 +51,13 @@ class FileFunction:
     name: str
 
     def __call__(self, point: OperatingPoint, wall: WantedWall | None = None) -> Any:
+        """Value at a point, for a wanted wall where there is one; what is printed goes to standard error."""
         own = _measures(self.file, self.text)[self.name]
         with redirect_stdout(sys.stderr):
             return (own if wall is None else own.at_wall(wall)).compute(point)
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as path, compressed content and name, by which another process loads it again."""
         # a content that mentions __main__ must not be taken for a function that exists in this process only
         return _unpickled, (self.file, compress(self.text.encode()), self.name)
 
@@ -97,6 +99,7 @@ def measure(
         raise ValueError(f"a measure's better must be 'higher', 'lower' or None, got {better!r}")
 
     def make_measure(function: Function) -> Measure:
+        """The measure of a function, which needs a wanted wall where it takes a second argument."""
         lines = (function.__doc__ or function.__name__.replace("_", " ")).strip().splitlines()
         measure_title = title or lines[0].rstrip(".")
         of_wall = len(signature(function).parameters) > 1
@@ -143,6 +146,7 @@ def load_measures(path: str) -> dict[str, Measure]:
 
 
 def _unpickled(file: str, text: bytes, name: str) -> FileFunction:
+    """The function of a file by its path, compressed content and name."""
     return FileFunction(file, decompress(text).decode(), name)
 
 
@@ -154,6 +158,7 @@ def _measures(file: str, text: str) -> dict[str, Measure]:
 
 
 def _run(file: Path, text: str) -> ModuleType:
+    """Run a user's file as a module. Raises ValueError that names the line at which it fails."""
     label = f"zwidth_measures_{sha256((str(file) + text).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(label, file)
     assert spec is not None

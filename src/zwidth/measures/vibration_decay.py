@@ -120,6 +120,7 @@ def fastest_mass(
     from scipy.optimize import minimize_scalar
 
     def radius(log_mass: float) -> float:
+        """Spectral radius at the wall with a motor-side mass, given by its logarithm."""
         changed = replace(loop, plant=with_motor_side_mass(loop.plant, float(np.exp(log_mass))))
         return float(spectral_radius(changed, wall_stiffness, wall_damping))
 
@@ -174,6 +175,7 @@ def spectral_radius_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
     """Spectral radius of the wanted wall by eigenvalues, for any model and loop."""
 
     def alone(at: Index) -> float:
+        """Spectral radius at the point of an index."""
         return float(_verdicts(point, wanted, at).spectral_radius[0])
 
     return complete_pointwise(_radii(point, wanted), alone, point)
@@ -185,6 +187,7 @@ def decay_time_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Me
     known = np.where(radii < 1.0 - NEAR, decay_time(radii, period), np.nan)
 
     def alone(at: Index) -> float:
+        """Decay time at the point of an index [s]. Raises NoValueError where vibration does not decay."""
         radius, verdict = radii[at], UNSTABLE
         if not radius > 1.0 + NEAR:
             verdicts = _verdicts(point, wanted, at)
@@ -204,5 +207,6 @@ def _radii(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Floats:
 
 
 def _verdicts(point: OperatingPoint, wanted: WantedWall | WantedWalls, at: Index) -> Verdicts:
+    """Verdict on the wanted wall at the point of an index, by eigenvalues."""
     K, B = walls_of(wanted, point.shape)
     return judge(point[at].loop, [K[at]], [B[at]])

@@ -144,7 +144,7 @@ def global_isotropy_index(
 def _cells(
     values: ArrayLike, status: ArrayLike | None, weights: ArrayLike | None
 ) -> tuple[Floats, Floats, Flags, Flags]:
-    """Flat values and weights, which cells count, and which have a posture."""
+    """Values and weights of all cells, which cells count, and which have a posture, each (k,)."""
     x = np.asarray(values, dtype=np.float64)
     s = np.full(x.shape, OK, dtype=np.uint8) if status is None else np.asarray(status)
     if s.shape != x.shape:
@@ -165,6 +165,7 @@ def _cells(
 
 
 def _weight_share(weights: Floats, total: float) -> float:
+    """Share of the weights in a total; nan where that is 0."""
     return float(weights.sum()) / total if total else float("nan")
 
 
@@ -177,6 +178,7 @@ def _moments(x: Floats, w: Floats) -> tuple[float, float]:
 
 
 def _uniformity(least: float, largest: float) -> float:
+    """Least over largest value, 1 where all are equal; nan where one is negative."""
     if least == largest:
         return 1.0
     return least / largest if least >= 0.0 else float("nan")

@@ -90,6 +90,7 @@ def load_environment(source: str) -> Environment:
 
 
 def _run(file: Path) -> ModuleType:
+    """Run a user's file as a module. Raises ValueError that names the line at which it fails."""
     label = f"zwidth_environment_{sha256(str(file.resolve()).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(label, file)
     assert spec is not None
@@ -110,6 +111,7 @@ def _run(file: Path) -> ModuleType:
 
 
 def _line(error: BaseException, file: Path) -> int:
+    """Last line of the file in an error's traceback; 0 for none."""
     line, frame = 0, error.__traceback__
     while frame is not None:
         if Path(frame.tb_frame.f_code.co_filename).resolve() == file.resolve():
@@ -119,6 +121,7 @@ def _line(error: BaseException, file: Path) -> int:
 
 
 def _missing(file: Path, name: str, module: ModuleType, attribute: object) -> str:
+    """Message: the file has nothing of this name, or what it has (`attribute`) is no environment."""
     own = [key for key, value in vars(module).items() if isinstance(value, Environment)]
     if attribute is not None:
         return f"{name} in {file.name} is not an environment; put @environment(...) above it"
@@ -128,7 +131,7 @@ def _missing(file: Path, name: str, module: ModuleType, attribute: object) -> st
 
 
 def _try(environment: Environment) -> None:
-    """Machine code does not check how far it reads into an array: let Python do it once, inside and outside."""
+    """Raise ValueError for a function that reads beyond its arrays: Python notices it, machine code does not."""
     values = np.array([1.0 if np.isnan(p.default) else p.default for p in environment.parameters])
     memory = np.zeros(MEMORY)
     for position, velocity in ((1e-3, 0.1), (1e-3, -0.1), (-1e-3, 0.1), (0.0, 0.0)):

@@ -61,6 +61,7 @@ def function_at(signature: Any) -> Any:
     kind = numba.types.FunctionType(signature)
     proxy: Any = cgutils.create_struct_proxy
 
+    # the call's type, and what writes its machine code: a function structure around the address
     @intrinsic  # type: ignore[untyped-decorator]
     def at(typing_context: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
@@ -150,6 +151,7 @@ class Environment:
     surface: bool = False
 
     def __post_init__(self) -> None:
+        """Take over the docstring and the module of the function."""
         # help() and doctest see the function through these
         for name in ("__doc__", "__module__"):
             object.__setattr__(self, name, getattr(self.function, name))
@@ -198,11 +200,13 @@ class Environment:
         return tuple(parameter.name for parameter in self.parameters)
 
     def _unknown(self, name: str) -> str:
+        """Message: the environment has no parameter of this name; with the nearest."""
         near = get_close_matches(name, self.names, n=1)
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(self.names) or 'none'}"
         return f"{self.name} has no parameter {name}; {hint}"
 
     def _faults(self, parameter: Parameter, value: object) -> list[str]:
+        """Messages, one or none: a parameter's value is no number, missing or not allowed."""
         unit = f" [{unit_text(parameter.unit)}]" if parameter.unit else ""
         what = f"{parameter.name} of {self.name}"
         if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
@@ -214,6 +218,7 @@ class Environment:
         return []
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as the source by which another process finds it. Raises TypeError where it has none."""
         if not self.source:
             raise TypeError(f"{self.name} cannot be sent to another process: it is in no file of its own")
         return _verbs.environment_named, (self.source,)
@@ -246,6 +251,7 @@ def environment(
     """
 
     def decorate(function: ForceLaw) -> Environment:
+        """Make the environment of a function, once both it and the parameters are checked."""
         _check(function)
         description = (inspect.getdoc(function) or "").split("\n")[0]
         title = name or function.__name__.replace("_", " ")
@@ -257,6 +263,7 @@ def environment(
 
 
 def _source(function: ForceLaw) -> str:
+    """Name of a bundled function, "file:name" of a user's; "" for one that is in no file."""
     file = Path(function.__code__.co_filename)
     if (function.__module__ or "").startswith(f"{__package__}."):
         return function.__name__
@@ -264,6 +271,7 @@ def _source(function: ForceLaw) -> str:
 
 
 def _check(function: ForceLaw) -> None:
+    """Raise ValueError for a function that does not take the six arguments, or that raises errors itself."""
     code = function.__code__
     where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: {function.__name__}"
     kinds = {inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD}
@@ -275,6 +283,7 @@ def _check(function: ForceLaw) -> None:
 
 
 def _check_parameters(made: Environment) -> None:
+    """Raise ValueError for two parameters of one name, or a default that is not allowed."""
     twice = {name for name in made.names if made.names.count(name) > 1}
     if twice:
         raise ValueError(f"{made.where}: {made.name} has two parameters named {twice.pop()}")

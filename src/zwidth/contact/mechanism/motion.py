@@ -99,7 +99,7 @@ class MechanismMotion(Result):
 
     @property
     def started_inside(self) -> bool:
-        """Was the handle inside the wall at the start?"""
+        """Whether the handle was inside the wall at the start."""
         return bool(len(self.depth) and self.depth[0] > 0.0)
 
     @property
@@ -201,6 +201,7 @@ class MechanismMotion(Result):
         """The motion in time as columns, one for each component."""
 
         def parts(values: Floats, name: str) -> dict[str, Floats]:
+            """Columns of a vector's components (k, 3), each named by its axis."""
             return {name.format(axis): values[:, k] for k, axis in enumerate(AXES)}
 
         drives = {
@@ -230,6 +231,7 @@ class MechanismMotion(Result):
         }
 
     def _energies(self) -> dict[str, Floats]:
+        """Energy and work at each sample by key [J]."""
         return {
             "kinetic_J": self.kinetic,
             "elastic_J": self.elastic,
@@ -240,6 +242,7 @@ class MechanismMotion(Result):
         }
 
     def __repr__(self) -> str:
+        """Lines with what was simulated, how it ended, where the handle went, and the largest depth and force."""
         met = "free" if self.surface is None else f"at a {type(self.surface).__name__.lower()}"
         if self.environment is not None:
             met += f" that renders {self.environment.name}"

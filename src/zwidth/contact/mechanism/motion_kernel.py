@@ -140,7 +140,7 @@ def ready(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
 
 @compiled_lean
 def check_state(system: System, memory: Memory, x: Floats, condition: float) -> int:
-    """Whether the motion can go on from this state; its loops are compared with those one sample before."""
+    """Status: whether the motion can go on from this state; its loops are compared with those a sample before."""
     work, mech = memory.work, system.mech
     for i in range(x.size):
         if not np.isfinite(x[i]):

@@ -56,7 +56,7 @@ class RenderingMemory(NamedTuple):
 
 @compiled
 def rendering_memory_of(mech: MechanismArrays, computer: Computer) -> RenderingMemory:
-    """That of a computer that has just been switched on."""
+    """The memory of a mechanism's computer that has just been switched on."""
     return RenderingMemory(
         signals_of(computer, 3, mech.driven),
         working_memory(mech),
@@ -181,7 +181,7 @@ def rendering_inputs(
     seed: int,
     together: bool,
 ) -> RenderingInputs:
-    """The law at a surface.
+    """What the computer renders, reads and commands, as numbers for the kernels; see `RenderingInputs`.
 
     counted  False: encoders without steps and noise
     """

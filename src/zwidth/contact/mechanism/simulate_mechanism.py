@@ -251,7 +251,7 @@ def _run(
 
 
 def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
-    """The first state: joints and motors together, no drive bent."""
+    """The first state (N,), from the drives' rates (d,) [rad/s]: joints and motors together, no drive bent."""
     d, n = len(system.motor), len(system.damping)
     start = np.zeros(2 * n + len(system.lag_time))
     start[:d], start[n : n + d] = system.mech.to_drive[0] @ posture.angles[mechanism.drives.joint], rates
@@ -265,6 +265,7 @@ def _samples_done(trace: kernel.Trace) -> int:
 
 
 def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
+    """Records to be filled, of so many samples, states and drives; positions are nan until they are reached."""
     k = samples
     return kernel.Trace(
         state=np.empty((k, states)),
@@ -422,6 +423,7 @@ def rendered_environment(wall: SurfaceRendering, surface: Surface) -> tuple[Envi
 
 
 def _values(wall: SurfaceEnvironment, two_sided: bool) -> Floats:
+    """Parameters (P,) of an environment. Raises ArgumentError for another number of them, or a two-sided plane."""
     names, values = wall.environment.names, np.array(wall.values, dtype=np.float64)
     if values.shape != (len(names),):
         raise ArgumentError(
@@ -459,7 +461,7 @@ def motion_inputs(
     substeps: int,
     drives: int,
 ) -> MotionInputs:
-    """The numbers of a motion. Raises ArgumentError."""
+    """Number of samples, push and gravity of a motion. Raises ArgumentError for what cannot be simulated."""
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))
     check_memory(
         samples * (23.0 + 12.0 * drives),
@@ -513,6 +515,7 @@ def _check_drives(mechanism: Mechanism) -> None:
 
 
 def _check_friction(mechanism: Mechanism) -> None:
+    """Raise ArgumentError for a drive with an impossible Coulomb friction, or with a programmable brake."""
     parts = mechanism.drives.nonlinearity
     if parts is None:
         return
@@ -531,6 +534,7 @@ def _check_friction(mechanism: Mechanism) -> None:
 
 
 def _push(push: ArrayLike | None, samples: int) -> Floats:
+    """Force at the handle, (1, 3) for all samples or (samples, 3) [N]; 0 for None. Raises ArgumentError."""
     if push is None:
         return np.zeros((1, 3))
     given = np.array(push, dtype=np.float64, order="C")
@@ -548,10 +552,12 @@ def _push(push: ArrayLike | None, samples: int) -> Floats:
 
 
 def _gravity(gravity: ArrayLike | None) -> Floats:
+    """Gravity (3,) [m/s²]; 0 for None. Raises ArgumentError."""
     return np.zeros(3) if gravity is None else _vector("gravity", gravity, "m/s²")
 
 
 def _vector(what: str, value: ArrayLike, unit: str) -> Floats:
+    """Vector (3,) of two or three finite numbers. Raises ArgumentError about `what` for others."""
     given = np.array(value, dtype=np.float64)
     if given.shape not in ((2,), (3,)) or not np.all(np.isfinite(given)):
         raise ArgumentError(what, f"must be two or three finite numbers [{unit}], got {given.tolist()}")

@@ -37,7 +37,7 @@ SWEEPS: Final = 20  # of the drives' frictions against each other
 
 @compiled_lean
 def turned_vector(memory: Memory, x: Floats) -> bool:
-    """Have the joints turned so far since A was taken that it is worth taking anew?"""
+    """Whether the joints have turned so far since A was taken that it is worth taking anew."""
     base = memory.base
     most = 0.0
     for i in range(base.size):
@@ -47,7 +47,7 @@ def turned_vector(memory: Memory, x: Floats) -> bool:
 
 @compiled_lean
 def linearise_drives(system: System, memory: Memory, x: Floats) -> None:
-    """Fill A at a configured state."""
+    """Fill A (N, N), the linear part of x' by drives and dampers, at a configured state x (N,)."""
     A, rest, base = memory.linear, memory.rest, memory.base
     motor, spring, B, along = system.motor, system.spring, system.damping, system.lag_along
     n, lags = B.shape[0], system.lag_time.size
@@ -128,7 +128,7 @@ def prepare(system: System, memory: Memory, h: float, part: int) -> None:
 
 @compiled_lean
 def multiply_stage(matrix: Floats, stages: Floats, source: int, target: int) -> None:
-    """stages[target] = matrix stages[source]"""
+    """Fill stages[target] with the product matrix stages[source]."""
     for i in range(matrix.shape[0]):
         total = 0.0
         for j in range(matrix.shape[0]):
@@ -177,7 +177,7 @@ def velocity_without_own_friction(
 
 @compiled_lean
 def law_of_bristles(system: System, i: int) -> tuple[float, float, float, float, float]:
-    """C, F_s, v_s, sigma_0 and sigma_1 of motor i."""
+    """C, F_s, v_s, sigma_0 and sigma_1 of motor i's friction, as `plant_step.bristle_force` takes them."""
     numbers = system.friction
     return numbers[i, 0], numbers[i, 1], numbers[i, 2], numbers[i, 3], numbers[i, 4]
 

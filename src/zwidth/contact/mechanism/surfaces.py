@@ -70,7 +70,7 @@ Surface = Plane | Sphere | Box
 
 
 def surface_document(surface: Surface, two_sided: bool) -> dict[str, Any]:
-    """A surface by keys and units; two_sided: does what is rendered at a plane act on both of its sides?"""
+    """A surface by keys and units; two_sided: whether what is rendered at a plane acts on both sides."""
     match surface:
         case Plane():
             return {"kind": "plane", "point_m": surface.point, "normal": surface.normal, "two_sided": two_sided}
@@ -139,6 +139,7 @@ def depth_and_normal(surface: Surface, position: Sequence[float] | Floats) -> tu
     return depth.reshape(x.shape[:-1]), normal.reshape((*x.shape[:-1], 3))
 
 
+# fills in depths (k,) [m] and normals (k, 3) at positions (k, 3) [m]
 @compiled
 def _depths(surface: Floats, position: Floats, depth: Floats, normal: Floats) -> None:
     for i in range(depth.size):
@@ -189,7 +190,7 @@ def _box(surface: Floats, dx: float, dy: float, dz: float) -> tuple[float, float
 
 
 def _vector(what: str, value: Sequence[float] | Floats) -> Floats:
-    """(3,) from two or three coordinates."""
+    """Vector (3,) from two or three coordinates, the third then 0. Raises ValueError about `what` for others."""
     given = np.asarray(value, dtype=np.float64)
     if given.shape not in ((2,), (3,)) or not np.all(np.isfinite(given)):
         raise ValueError(f"{what} must be two or three finite numbers, got {np.asarray(value).tolist()}")
