@@ -265,9 +265,10 @@ def _largest_stiffnesses(
 ) -> list[_Column]:
     """The largest stable stiffness at dampings B (m,), from a start that should be stable; 0 where it is not.
 
-    Of a nonlinear device the lowest change counts, whatever `levels` (see `observe`) says. Returns as `_Column`.
+    Of a nonlinear device the lowest change counts, whatever `levels` (see `observe`) says.
 
     tolerance  as a share of the start;   within  softest and stiffest wall [N/m];   step  (m,)  the first [N/m]
+    Returns    at each damping: it, the stiffness [N/m], and whether an unstable wall was found
     """
     least, most = within
     m = len(B)

@@ -363,7 +363,7 @@ class PlantArrays(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """m runs.
+    """m runs of the engine, each with what differs from run to run.
 
     device      (m,)     index
     start       (m, R)   states at time 0, place and speed of each element's motion

@@ -326,7 +326,7 @@ SHOWN_BETWEEN: Final = 20  # substeps of a run that is exact with any number
 
 
 class RunLength(NamedTuple):
-    """Seconds to simulate, and the reason for so many."""
+    """Length of a run: seconds to simulate, and the reason for so many."""
 
     seconds: float
     reason: str

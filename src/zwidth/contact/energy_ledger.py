@@ -55,7 +55,8 @@ from zwidth.contact.plant_step import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRIN
 
 
 class Ledger(NamedTuple):
-    """entries (12,) or none: the ledger;   last (7,)  what the previous sample left;   work (M,)  memory"""
+    """entries (12,) or none: the ledger [J];   last (7,)  what the previous sample left, LAST_TRUTH to BEGUN;
+    work (M,)  memory of `enter_substep`"""
 
     entries: Floats
     last: Floats

@@ -169,7 +169,7 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
 
 
 class IntervalPart(NamedTuple):
-    """A part of an interval, at whose beginning something changes; fields as of `PlantArrays`."""
+    """A part of an interval, at whose beginning something changes: its share, and fields as of `PlantArrays`."""
 
     share: float
     substeps: int

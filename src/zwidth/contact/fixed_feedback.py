@@ -27,7 +27,7 @@ class FeedbackArrays(NamedTuple):
     """The fixed feedback of D computers, padded to one size by what changes nothing.
 
     acts          (D, 3)        1 where there is a force sensor, a feedforward, a local loop
-    gains         (D, 8)
+    gains         (D, 8)        columns GAIN to LOCAL_DAMPING
     delays        (D, 2)        whole samples that the measured force, and the local loop's command, wait
     splits        (D,)          1 where the local loop's command waits for a part of its sample, too
     on_sensor     (D, f, 2, 3)  factors as of `Computer.filter`
@@ -50,11 +50,12 @@ class FeedbackArrays(NamedTuple):
 
 
 class FeedbackMemory(NamedTuple):
-    """What one run remembers.
+    """What one run remembers: readings and commands on their way, and the states of the factors (k, 2).
 
     first        (3,)   first reading, last velocity of the feedforward, and command that acts
     late         (q,)   measured forces on their way, the newest first
-    sensed       (f, 2) states of the factors, and so on
+    sensed       (f, 2) states of the force sensor's factors, as the others are of the fields they are named after
+    past, fast_past  (w,)  readings that the windows of feedforward and local loop look back on
     queue        (p,)   the local loop's commands, the newest first
     """
 

@@ -123,7 +123,8 @@ class Hand(Documented):
 
     @property
     def push_numbers(self) -> Floats:
-        """Numbers for `hand_force`."""
+        """Numbers (9,) for `hand_force`: push, ramp; reach times stiffness and damping of the arm, its start and
+        duration; amplitude, angular frequency and phase of the tremor."""
         numbers = np.zeros(PUSH_NUMBERS)
         numbers[:2] = self.push, self.ramp
         if self.reach is not None and self.operator is not None:
@@ -136,7 +137,7 @@ class Hand(Documented):
 
     @property
     def reflex_numbers(self) -> Floats:
-        """Numbers for `sample_brakes_and_reflexes`; an infinite threshold for none."""
+        """Fields of the reflex (7,) for `sample_brakes_and_reflexes`; an infinite threshold for none."""
         own = self.reflex
         if own is None:
             return np.array([inf, *np.zeros(REFLEX_NUMBERS - 1)])
@@ -153,7 +154,7 @@ def _check(name: str, value: float, unit: str, least: float, *, open_end: bool =
 
 @compiled_lean
 def hand_force(numbers: Floats, m: int, time: float) -> float:
-    """Push, reach and tremor of run m at a time [N]."""
+    """Force by push, reach and tremor of run m at a time [N]; numbers (., 9) as of `Hand.push_numbers`."""
     push, ramp = numbers[m, 0], numbers[m, 1]
     force = float(push * min(time / ramp, 1.0) if ramp > 0.0 else push)
     if numbers[m, 5] > 0.0 and time > numbers[m, 4]:

@@ -98,7 +98,7 @@ class PassivityController:
 
     @property
     def parameters(self) -> Floats:
-        """(5,) as `passivity_force` takes them."""
+        """Reference energy, largest damping and force, device damping, and 1 for counting "held" (5,)."""
         held = float(self.counting == "held")
         limits = [self.reference_energy, self.largest_damping, self.largest_force]
         return np.array([*limits, self.device_damping, held])

@@ -141,7 +141,7 @@ def simulate_contact(
 
 
 class _Contact(NamedTuple):
-    """What is simulated of one contact.
+    """A contact to be simulated: who touches what, and how the run begins.
 
     run                 of the device without a passivity controller
     distance_from_path  how far from the start the handle's path passes [m]; None for a device without a mechanism

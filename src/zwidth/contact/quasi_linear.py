@@ -70,7 +70,7 @@ def friction_velocity_of(swing: Vibration) -> float:
 class EquivalentLoop:
     """A loop with a wall, in the form in which its vibrations of any amplitude are computed.
 
-    offset  middle of the vibration, as a share of each counter's step
+    offset  middle of the vibration, as a share of each counter's step;   limit  largest force [N]
     """
 
     loop: Loop

@@ -42,8 +42,8 @@ class LoopArrays(NamedTuple):
 
     generator         (N, N)  of the plant, times T, in scaled states;   drive  (N,)  of the held force, likewise
     coordinates n       the first n states are positions [m], the next n velocities [m per sample]
-    period            T [s];  late  share of a sample by which the force changes late;   whole  samples of delay
-                      besides
+    period            T [s];   fractional_delay  share of a sample by which the force changes late;   whole_delay
+                      samples of delay besides
     stiffness, damping  of the wall [N/m], [N s/m];   limit  largest force [N]
     sensor            (n,)
     force_inputs      (N, f + s)  what a force along each friction's and spring's motion adds, times T, scaled

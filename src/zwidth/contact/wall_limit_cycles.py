@@ -461,7 +461,7 @@ Outcome = Literal["same", "other", "none", "open"]
 
 @dataclass(frozen=True)
 class Answers:
-    """Limit cycles by amplitude, and the predicted ones that no simulation has."""
+    """Limit cycles by amplitude, and those that are contradicted: predicted, but no simulation has them."""
 
     cycles: tuple[LimitCycleAnswer, ...]
     contradicted: tuple[LimitCycleAnswer, ...]

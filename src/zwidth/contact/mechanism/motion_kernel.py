@@ -38,7 +38,7 @@ NEAR_SINGULAR: Final = (
 class Trace(NamedTuple):
     """Records of k samples.
 
-    state (k, N);   position, seen, velocity, force (k, 3);   torque (k, d) at the joints;   depth (k,)
+    state (k, N);   position, counted_position, velocity, force (k, 3);   torque (k, d) at the joints;   depth (k,)
     energy (k, 3)  kinetic, elastic, gravitational [J];   work (k, 3)  by the hand, by the motors, against friction
     """
 

@@ -175,7 +175,7 @@ def _friction_numbers(plant: Plant, motor: Ints) -> tuple[Floats, Ints]:
 
 @compiled
 def motion_memory(system: System) -> Memory:
-    """Fresh memory for one thread."""
+    """Working memory of a motion, for one thread, filled with zeros."""
     mech = system.mech
     d, n, N = mech.driven, system.damping.shape[0], 2 * system.damping.shape[0] + system.lag_time.size
     return Memory(
