@@ -52,14 +52,22 @@ def one_line(text: str) -> str:
 
 
 def quote(value: Any) -> str:
-    """A value as it would stand in the file, shortened: 'text', 0.3, true, [1, 2], a table."""
+    """A value in the words of a message, shortened: the text 'a', 0.3, true, the list [1, 2], a table.
+
+    Of a whole number from 10^15 on its size only.
+
+    >>> quote(2**53), quote(-(10**20))
+    ('a whole number above 10^15', 'a whole number below -10^20')
+    """
     match value:
         case bool():
             return "true" if value else "false"
         case str():
             return f"the text {_shortened(value)!r}"
         case int() if abs(value) >= 10**15:
-            return f"a whole number above 10^{int(abs(value).bit_length() * math.log10(2))}"
+            power = int(abs(value).bit_length() * math.log10(2))  # of 10; or one more than the number has
+            power -= 10**power > abs(value)
+            return f"a whole number {'above ' if value > 0 else 'below -'}10^{power}"
         case float():
             return f"{value:.10g}"
         case dict():

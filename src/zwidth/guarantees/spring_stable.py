@@ -163,10 +163,11 @@ def _grid(loop: Loop, count: int) -> Floats:
 
 
 def _alternating(springs: SpringFamily) -> Floats:
-    """Shares of the springs that bring the line of a root at -1 nearest.
+    """Shares of the springs with which the line of walls with a root at z = -1 is nearest to the wall K = B = 0.
 
-    These lines, K + B w(-1) = -1/P(-1), are parallel: they have no envelope, but one of them binds. It belongs to
-    a mode near a multiple of the Nyquist frequency.
+    A root there is vibration that alternates from sample to sample, at the Nyquist frequency or a multiple. These
+    lines, K + B w(-1) = -1/P(-1), are parallel: they have no envelope, but one of them binds, by `_distance`. It
+    belongs to a mode near such a frequency; there is a share for each that has one.
     """
     nyquist = np.pi / springs.loop.period
     multiples = nyquist * np.arange(1.0, ALIASES + 2.0)

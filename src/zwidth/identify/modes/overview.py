@@ -107,6 +107,9 @@ def _band_powers(force: Floats, longest: int) -> Floats:
 def _covers(powers: Sequence[Floats]) -> bool:
     """Whether the fitted part has its share of the force's power in every band of frequencies that is excited.
 
+    Fitted are the first parts: of the stretches where there are many (2 UNSEEN), else of each; the rest is for the
+    validation.
+
     powers  `_band_powers` of each stretch
     """
     if not powers:

@@ -115,7 +115,7 @@ def relative_deviation(path: MeasuredPath, averages: float) -> Floats:
 
 
 def _sizes(value: Complexes) -> Floats:
-    """Magnitudes (n,), of small values among large ones a share of these: a zero weighs no more than others."""
+    """Magnitudes (n,), none below SMALL times its larger neighbour's: they divide errors, also beside a zero."""
     size = np.abs(value)
     around = np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1]))
     return np.asarray(np.maximum(size, SMALL * around))

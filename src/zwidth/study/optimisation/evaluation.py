@@ -240,7 +240,11 @@ class Judge:
         return None if self._sweep.weights is None else self._sweep.weights.ravel()
 
     def _reduce(self, column: Column, cells: Floats, status: NDArray[np.uint8]) -> tuple[float, int]:
-        """Value and status of a column from its values (members, w) at all points."""
+        """Value and status of a column from its values (members, w), members as in `_cells`.
+
+        Without a statistic a column has one value a member, its first entry, and the worst member counts. With
+        one, the statistic is over all members and points.
+        """
         if column.statistic is None:
             cells, status = cells[:, :1], status[:, :1]
         if (status != OK).any() and (self._sweep.complete or column.statistic is None):
