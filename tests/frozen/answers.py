@@ -122,8 +122,7 @@ class CommandWorker:
 def commands_of(worker: CommandWorker) -> list[str]:
     """Names of the commands that the help lists."""
     text = worker.ask(["--help"], COMPILING)["out"]
-    listed = text.partition("Commands:\n")[2].partition("\n\n")[0]
-    return re.findall(r"^  ([a-z][\w-]*)", listed, re.MULTILINE)
+    return re.findall(r"^  ([a-z][\w-]*)(?=  )", text, re.MULTILINE)  # in whatever sections they stand
 
 
 def warm_up(side: CommitSources, say: Callable[[str], None]) -> None:

@@ -89,8 +89,9 @@ def commands_with_arguments() -> set[str]:
 
 # commands without a number to compare: `new` and `import` write a device file, which tests of their own load and
 # chart; `compile` answers how many kernels it had to compile; `identify` reads records, whose tests know the
-# truth; limits of `export` end where a search has narrowed them to, and rounding may choose between its samples
-COMMANDS_WITHOUT_NUMBERS = {"new", "compile", "import", "identify", "export"}
+# truth; limits of `export` end where a search has narrowed them to, and rounding may choose between its samples,
+# as between the designs of `optimise`; `app` serves a page
+COMMANDS_WITHOUT_NUMBERS = {"new", "compile", "import", "identify", "export", "optimise", "app"}
 # what is asked of every n-th device only, because it takes long
 _SHARE = {
     "show": 1,

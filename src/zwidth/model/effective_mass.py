@@ -256,13 +256,16 @@ class DriveMotion:
 
 
 def drive_travel(mechanism: Mechanism, start: Floats, end: Floats, ratio: Floats) -> Floats:
-    """Travel (d,) of the drives' coordinates between two postures, given by their joint coordinates (n,)."""
+    """Travel (d,) of the drives' coordinates between two postures, given by their joint coordinates (n,).
+
+    ratio  (d,)  of the drives at the posture linearised about, by which the motor angle of a table is divided
+    """
     drives, way = mechanism.drives, end - start
     travel = way[drives.joint].copy()
     if drives.coupling is not None:
         travel += np.asarray(drives.coupling).reshape(len(travel), -1) @ way
     for i, table in enumerate(drives.ratio_tables or ()):
-        if table is not None:
+        if table is not None:  # such a drive has no coupling
             joint = drives.joint[i]
             travel[i] = float(table.motor_angle(end[joint]) - table.motor_angle(start[joint])) / ratio[i]
     return travel

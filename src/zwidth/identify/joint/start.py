@@ -131,8 +131,10 @@ def first_guess(
 
 
 def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
-    """The guess by least squares of forces f (s,) by rows A (s, c) of m, b, F forward and backward, perhaps k, all
-    over the mass and without m where nothing drives; with this delay of the force [s]."""
+    """The guess by least squares of forces f (s,), with this delay of the force [s].
+
+    A (s, c)  columns: m (only where driven), b, F forward, F backward, perhaps k; not driven, all over the mass
+    """
     norms = np.linalg.norm(A, axis=0)
     used = norms > 0.0
     scaled = A[:, used] / norms[used]
@@ -207,8 +209,10 @@ def search_guess(
 def _followed(
     windows: Windows, short: Windows, begun: tuple[JointNumbers, Floats, Floats]
 ) -> tuple[JointNumbers, Floats, Floats]:
-    """Follow numbers, starts and sums of squares from short windows to the whole ones; windows that are badly
-    predicted then begin anew."""
+    """Follow numbers, starts and sums of squares from short windows to the whole ones.
+
+    While any whole window is badly predicted, at most TRIES times, all begin anew from these numbers.
+    """
     numbers, starts, squares = begun
     before = short
     for parts in PARTS[1:]:

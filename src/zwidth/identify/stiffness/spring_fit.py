@@ -416,10 +416,10 @@ def without_spikes(values: Floats, resolution: Resolution) -> Flags:
 
 
 def turning_points(angle: Floats, threshold: float) -> list[int]:
-    """Rows at which the angle turns, both ends included: extremes from which it comes back by a threshold.
+    """Row 0, the rows of extremes from which the angle comes back by more than a threshold, and the last extreme.
 
-    >>> turning_points(np.array([0.0, 1.0, 2.0, 1.0, 0.0, -1.0, 0.0]), 0.5)
-    [0, 2, 5, 6]
+    >>> turning_points(np.array([0.0, 1.0, 2.0, 1.0, 0.0, -1.0, 0.0, 2.0, 1.8]), 0.5)
+    [0, 2, 5, 7]
     """
     turns, extreme, rising = [0], 0, 0
     readings = angle.tolist()  # Python's own numbers are compared faster, one by one
