@@ -15,7 +15,7 @@ from zwidth.device.load import load
 from zwidth.device.read import read
 from zwidth.errors import DeviceError
 from zwidth.model import pack
-from zwidth.model.inertia import joint_mass_matrix
+from zwidth.model.handle_position import joint_mass_matrix
 
 
 @pytest.mark.parametrize("name", bundled_names())

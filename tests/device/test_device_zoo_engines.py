@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from tests.model.model_engines import ask_mujoco, ask_pinocchio
 from zwidth.device import bundled_names, from_document
-from zwidth.device.legs import written
+from zwidth.device.address import written
 from zwidth.device.read import read
 from zwidth.errors import PostureError
 from zwidth.model import PRISMATIC, inertia_terms, natural_frequencies

@@ -22,10 +22,10 @@ from tests.study.executor_cases import (
 )
 from zwidth.errors import MeasureError
 from zwidth.measures import FAILED, MISSING, NO_VALUE, Note
+from zwidth.measures.definition import MORE, merge_notes
 from zwidth.study import Store, pack_job, run_job
 from zwidth.study.jobs import executor
 from zwidth.study.jobs.executor import batch_size
-from zwidth.study.jobs.job import MORE, merge_notes
 from zwidth.study.jobs.workers import cores
 
 NO_PATIENCE = -1.0  # patience that is over at once

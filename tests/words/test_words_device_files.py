@@ -13,7 +13,7 @@ from tests.device.device_cases import ARM_FILE, PLANT_FILE, REMOVED, faults, wit
 from zwidth.chart import largest_stiffness
 from zwidth.device import Device, from_document
 from zwidth.device.load import load
-from zwidth.device.schema.magnitudes import HEAVIEST, LIGHTEST
+from zwidth.device.schema.value_types import HEAVIEST, LIGHTEST
 from zwidth.errors import DeviceError
 
 # --- every way a device file's [plant] and [loop] can be wrong: the right key, the value, what -------

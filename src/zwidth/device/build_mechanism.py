@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
+from zwidth.device.address import LegMember, members, of_copies
 from zwidth.device.build import drive_columns, drive_nonlinearity, in_space, roll_pitch_yaw, value_or
-from zwidth.device.legs import LegMember, members, of_copies
 from zwidth.device.rules.mechanism import HELD
 from zwidth.device.schema.beam import BeamSection, MaterialSection, RectangleShape, RodShape, TubeShape
 from zwidth.device.schema.mechanism import (

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
-from zwidth.device.address import table
+from zwidth.device.address import members, table
 from zwidth.device.device import Device
 from zwidth.device.faults import KeyPath
-from zwidth.device.legs import members
 from zwidth.device.load import build_device, check
 from zwidth.device.mechanism_check import masses_moved
 from zwidth.device.rules.table import certainly_valid

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.arrays import Floats
+from zwidth.device.build import joint_angles, positions, rotations, screws, unit_vectors
 from zwidth.device.faults import fail, quote, suggestion
 from zwidth.device.plausibility import missing_numbers
-from zwidth.device.posture_arguments import joint_angles, positions, rotations, screws, unit_vectors
 from zwidth.errors import DeviceError
 from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from zwidth.measures.description import Description
     from zwidth.model.arm import Arm
     from zwidth.model.load import Load
-    from zwidth.model.modes import Damping
+    from zwidth.model.mechanism import Damping
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model

@@ -18,19 +18,19 @@ from pydantic import ValidationError
 
 from zwidth.arrays import Floats
 from zwidth.device import address, build
+from zwidth.device.address import members
+from zwidth.device.build import screws
 from zwidth.device.device import Device
 from zwidth.device.faults import Fault, KeyPath, dotted, fail
-from zwidth.device.legs import members
 from zwidth.device.plausibility import warn_of_implausible
-from zwidth.device.posture_arguments import screws
 from zwidth.device.read import KEY, OPERATORS, bundled, check_not_newer, read, without_version
 from zwidth.device.rules.plant import operator_faults
-from zwidth.device.rules.table import device_faults
+from zwidth.device.rules.table import device_faults, without_unsupported
 from zwidth.device.schema.device_file import DEVICE_KEYS, STUDY_KEYS, DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.schema.operator import ArmSection, OperatorSection
 from zwidth.device.schema.value_types import VERSION, Section, WholeNumber
-from zwidth.device.validation_messages import validation_messages, without_unsupported
+from zwidth.device.validation_messages import validation_messages
 from zwidth.errors import BeamError, DeviceError, LoadError
 from zwidth.model.argument_checks import wrong_type
 from zwidth.model.load import Load

@@ -8,12 +8,11 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Flags, Floats
+from zwidth.device.address import members
 from zwidth.device.faults import KeyMessages, comma_list, plural
-from zwidth.device.legs import members
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.model.continuation import assemble_batch
-from zwidth.model.handle_position import NEARBY, constraints
-from zwidth.model.inertia import joint_axes, joint_mass_matrix
+from zwidth.model.handle_position import NEARBY, constraints, joint_axes, joint_mass_matrix
 from zwidth.model.mechanism import FIXED, POSE, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture import OK, Posture, solve_posture

@@ -32,9 +32,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.device.address import is_number, table
+from zwidth.device.address import is_number, members, table, written
 from zwidth.device.faults import Fault, KeyMessages, KeyPath, comma_list, dotted
-from zwidth.device.legs import members, written
 from zwidth.device.rules.plant import largest_ratio
 from zwidth.errors import DeviceError
 from zwidth.loop.controller import NotKnown

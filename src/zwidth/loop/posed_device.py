@@ -38,9 +38,8 @@ from zwidth.model.effective_mass import (
 from zwidth.model.equilibrium import Equilibrium, solve_equilibrium
 from zwidth.model.load import Load, unit_of_push
 from zwidth.model.loaded_posture import loaded_postures
-from zwidth.model.mechanism import Drives, Mechanism, drives_at
+from zwidth.model.mechanism import Damping, Drives, GivenDamping, Mechanism, drives_at
 from zwidth.model.mechanism_arrays import pack
-from zwidth.model.modes import Damping, GivenDamping
 from zwidth.model.motions import Motions
 from zwidth.model.operator import ABOUT_AN_AXIS, Operator
 from zwidth.model.plant import Plant

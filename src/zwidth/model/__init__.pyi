@@ -1,8 +1,8 @@
 from .effective_mass import effective_parameters as effective_parameters
+from .mechanism import GivenDamping as GivenDamping
 from .mechanism import Mechanism as Mechanism
-from .modes import GivenDamping as GivenDamping
-from .modes import ModalDamping as ModalDamping
-from .modes import ProportionalDamping as ProportionalDamping
+from .mechanism import ModalDamping as ModalDamping
+from .mechanism import ProportionalDamping as ProportionalDamping
 from .modes import natural_frequencies as natural_frequencies
 from .multi_plant import MultiPlant as MultiPlant
 from .multi_plant import reduce_directions as reduce_directions

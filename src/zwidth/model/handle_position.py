@@ -12,7 +12,8 @@ the posture solver gets there, too: it knows assemblies, and that the edge of a 
 ends in a local minimum, so that another place may be nearer: what comes back is an answered position, not the
 nearest.
 
-Check that each degree of freedom has a drive or is said to be free, and that the handle shows the drives.
+Check that each degree of freedom has a drive or is said to be free, and that the handle shows the drives; joint
+axes and the mass matrix of all joints of a mechanism with its loops cut open, which say what moves without mass.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
-from zwidth.model.closure import equations
+from zwidth.model.closure import equations, passive_rates
 from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, SINGULAR_CONDITION, assemble_batch, set_goal
 from zwidth.model.forward_kinematics import fill_handle_axes, link_point, move_joints, place_links, working_memory
-from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, REVOLUTE, Mechanism
-from zwidth.model.mechanism_arrays import MechanismArrays
+from zwidth.model.inertia import mass_matrix, unit_motions
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, REVOLUTE, Mechanism, with_any_ratio
+from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture_batch import solve_batch
 from zwidth.model.roadmap import begin_to_turn, roadmap, turn_drive
 from zwidth.model.rotations import rotation_matrix, rotation_vector
@@ -347,3 +349,44 @@ def _rank(rows: Floats, sizes: Floats) -> Ints:
         return np.zeros(len(rows), dtype=np.int64)
     values = np.linalg.svd(rows, compute_uv=False)
     return np.asarray((values > NEGLIGIBLE * sizes[:, None]).sum(axis=1))
+
+
+def joint_axes(mechanism: Mechanism, coordinates: Floats) -> Floats:
+    """Joint axes in the base frame at joint coordinates (n,) of one design, (n, 3)."""
+    mech = pack(mechanism)
+    return np.asarray(_axes(mech, np.ascontiguousarray(coordinates)))
+
+
+def joint_mass_matrix(mechanism: Mechanism, coordinates: Floats) -> Floats:
+    """Mass matrix (m, m) of the links and of the rotors behind rigid drives at joint coordinates (n,) of one
+    design, the loops cut open; joints in the order of the unknowns (`MechanismArrays.joint`). A ratio that changes
+    is the first of its table: what is asked is whether every motion has a mass."""
+    mech, drives = pack(mechanism), with_any_ratio(mechanism.drives)
+    none = np.zeros(0, dtype=np.int64)
+    cut = mech._replace(a=none, b=none, closing=none, first_row=np.zeros(1, dtype=np.int64))
+    M = np.empty((1, mech.joint.size, mech.joint.size))
+    _mass(cut._replace(driven=mech.joint.size, free=0), np.ascontiguousarray(coordinates), M)
+    rigid = np.where(np.isinf(drives.stiffness), drives.transmission**2 * drives.motor_inertia, 0.0)
+    rotors = np.zeros(mech.joint.size)
+    rigid = rigid[[i for i in range(len(rigid)) if i not in drives.surplus]]  # the others have no coordinate
+    rotors[mech.joint.size - mech.free - mech.driven : mech.joint.size - mech.free] = rigid
+    return np.asarray(M[0] + np.diag(rotors))
+
+
+# Joint axes (n, 3) of the only design in the base frame, at joint coordinates (n,).
+@compiled
+def _axes(mech: MechanismArrays, angles: Floats) -> Floats:
+    work = working_memory(mech)
+    place_links(mech, 0, angles, work)
+    return work.axis
+
+
+# Fills in out (1, c, c), the links' mass matrix in the independent coordinates, at joint coordinates (n,).
+@compiled
+def _mass(mech: MechanismArrays, angles: Floats, out: Floats) -> None:
+    work = working_memory(mech)
+    place_links(mech, 0, angles, work)
+    equations(mech, 0, work)
+    passive_rates(mech, 0, work)
+    unit_motions(mech, work)
+    mass_matrix(mech, 0, work, out, 0)

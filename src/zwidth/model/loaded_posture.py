@@ -40,9 +40,9 @@ from zwidth.model.equilibrium import Balance, Equilibrium, command_change
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.load import Load, unit_of_push
-from zwidth.model.mechanism import BALL_X, POSITION, Mechanism, drives_at, nonlinear_of_drives
+from zwidth.model.mechanism import BALL_X, POSITION, Damping, Mechanism, drives_at, nonlinear_of_drives
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-from zwidth.model.modes import Damping, clusters, repeat_tolerance, undamped_modes
+from zwidth.model.modes import clusters, repeat_tolerance, undamped_modes
 from zwidth.model.plant import Plant, SampledForce
 from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
 from zwidth.model.reduction import Encoders, reduce_mechanism

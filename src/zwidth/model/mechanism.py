@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.model.design_axes import Array1, Array2, Array3, design_shape
+from zwidth.model.design_axes import Array1, Array2, Array3, Number, design_shape
 from zwidth.model.flexible_body import FlexibleLink
 from zwidth.model.plant import Brake, Counter, Friction, FrictionModel, Nonlinear, Spring
 
@@ -313,6 +313,45 @@ class Drives:
     motor_link: Ints | None = None
     motor_axis: Array2 | None = None
     ratio_tables: tuple[RatioTable | None, ...] | None = None
+
+
+# Where a device's own damping comes from: three sources, each applied to the full model's matrices and to the
+# reduced models in `reduction`.
+
+
+@dataclass(frozen=True)
+class ModalDamping:
+    """Damping ratio zeta of every flexible mode, 0.05 for 5 %; at least 0."""
+
+    ratio: Number
+
+    def __post_init__(self) -> None:
+        _check_coefficient("damping ratio", self.ratio)
+
+
+@dataclass(frozen=True)
+class ProportionalDamping:
+    """B = r_m M + r_k K, both coefficients at least 0 (thesis eq. 3.2)."""
+
+    mass_coefficient_1_per_s: Number
+    stiffness_coefficient_s: Number
+
+    def __post_init__(self) -> None:
+        _check_coefficient("mass coefficient", self.mass_coefficient_1_per_s)
+        _check_coefficient("stiffness coefficient", self.stiffness_coefficient_s)
+
+
+@dataclass(frozen=True)
+class GivenDamping:
+    """The dampers of the drives, parallel to their stiffnesses (`Drives.damping`)."""
+
+
+Damping = ModalDamping | ProportionalDamping | GivenDamping
+
+
+def _check_coefficient(what: str, value: float) -> None:
+    if not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
+        raise ValueError(f"the {what} must be a finite number of at least 0, got {value}")
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.errors import DirectionError, ModelError
 from zwidth.model.effective_mass import is_plain, screw
-from zwidth.model.mechanism import Mechanism, at_postures
-from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping, modal_matrix
+from zwidth.model.mechanism import Damping, Mechanism, ModalDamping, ProportionalDamping, at_postures
+from zwidth.model.modes import modal_matrix
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import MODELS, Model, full_matrices, links_and_drives, reduce_mechanism

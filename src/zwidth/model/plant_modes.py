@@ -17,9 +17,9 @@ from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.design_axes import design_shape
 from zwidth.model.effective_mass import DriveSide, drive_side, lever_arms, screw
-from zwidth.model.mechanism import Mechanism, at_postures
+from zwidth.model.mechanism import Damping, Mechanism, ModalDamping, ProportionalDamping, at_postures
 from zwidth.model.mechanism_arrays import design_of_each, per_design
-from zwidth.model.modes import REPEATED, RIGID, Damping, ModalDamping, ProportionalDamping
+from zwidth.model.modes import REPEATED, RIGID
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture
 from zwidth.model.reduction import Encoders

@@ -32,19 +32,18 @@ from zwidth.model.effective_mass import (
     lever_arms,
     screw,
 )
-from zwidth.model.mechanism import Drives, Mechanism, at_postures, nonlinear_of_drives
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.modes import (
+from zwidth.model.mechanism import (
     Damping,
+    Drives,
     GivenDamping,
+    Mechanism,
     ModalDamping,
     ProportionalDamping,
-    add_dampers,
-    modal_matrix,
-    project_dampers,
-    undamped_modes,
-    winding_dampers,
+    at_postures,
+    nonlinear_of_drives,
 )
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.modes import add_dampers, modal_matrix, project_dampers, undamped_modes, winding_dampers
 from zwidth.model.motions import Motions
 from zwidth.model.plant import Friction, LaggedDamper, Nonlinear, Plant, project_onto_motions
 from zwidth.model.posture import OK, Posture

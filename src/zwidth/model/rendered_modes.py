@@ -22,9 +22,8 @@ import numpy as np
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, inverse_form, lever_arms, screw
-from zwidth.model.mechanism import Mechanism, at_postures
+from zwidth.model.mechanism import Damping, Mechanism, ModalDamping, ProportionalDamping, at_postures
 from zwidth.model.mechanism_arrays import design_of_each, per_design
-from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, Model
 from zwidth.resources import in_chunks

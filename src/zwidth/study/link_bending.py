@@ -22,10 +22,9 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.device.address import is_number, table
+from zwidth.device.address import is_number, members, table, written
 from zwidth.device.build_mechanism import own_body
 from zwidth.device.device import Device
-from zwidth.device.legs import members, written
 from zwidth.device.load import from_document
 from zwidth.device.schema.beam import BeamSection
 from zwidth.errors import BeamError, ChartError, EquilibriumError, UnresolvedError
@@ -35,8 +34,8 @@ from zwidth.model.argument_checks import check_kind
 from zwidth.model.beam_bodies import carried_body
 from zwidth.model.beam_section import beam_properties, typical_material
 from zwidth.model.beam_section import tube as tube_section
-from zwidth.model.mechanism import Mechanism
-from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping, undamped_modes
+from zwidth.model.mechanism import Damping, Mechanism, ModalDamping, ProportionalDamping
+from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 from zwidth.result import Documented, Result, documented, entry
 

@@ -11,8 +11,7 @@ from zwidth.device.address import is_number, row_count, table, tables
 from zwidth.device.faults import KeyMessages, KeyPath, plural
 from zwidth.device.rules.loop import lag_rule, lags_allowed, lags_wrongly
 from zwidth.device.rules.rule import Document, KeyRule, NumberRule, Numbers, Read, Rule
-from zwidth.device.schema.magnitudes import STRONGEST_DAMPING
-from zwidth.device.schema.value_types import LARGEST
+from zwidth.device.schema.value_types import LARGEST, STRONGEST_DAMPING
 
 # Keys of a friction section without their units -> the models that read them.
 READ_BY: Final = {

@@ -15,9 +15,8 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.address import is_number, table
+from zwidth.device.address import is_number, table, written
 from zwidth.device.faults import KeyMessages, KeyPath
-from zwidth.device.legs import written
 from zwidth.loop.controller import MOST_FAST_SAMPLES
 from zwidth.model.design_axes import join_designs
 

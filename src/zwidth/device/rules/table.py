@@ -9,6 +9,8 @@ judged by its own numbers.
 Rules about numbers, vectors and matrices are those of a file. What a file says of a single number is asked of the
 file's own types, at the ends of the range that they allow. Rules about keys hold for all designs, which have the
 same keys; a number that may stand for none, 0 or infinity, is so in all of them or in none (`design_batch`).
+
+Values that device files may hold one day, refused until then: never ignored.
 """
 
 from __future__ import annotations
@@ -20,16 +22,14 @@ import numpy as np
 from pydantic import AfterValidator, ValidationError
 
 from zwidth.arrays import Flags, Floats
-from zwidth.device.address import deep_copy, exists, in_schema, table
+from zwidth.device.address import deep_copy, exists, in_schema, spread_tables, table, written_path
 from zwidth.device.faults import KeyMessages, KeyPath
-from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.plausibility import partly_missing
 from zwidth.device.rules.loop import COMPUTER, RESPONSE, SAMPLING
 from zwidth.device.rules.mechanism import ARM, LEGS_AS_WRITTEN, MECHANISM
 from zwidth.device.rules.plant import HAND, MOTION, PLANT, WINDINGS
 from zwidth.device.rules.rule import Document, NumberRule, Numbers, Rule, places, rule_faults
 from zwidth.device.schema.device_file import KINDS, DeviceFile, flat_sources
-from zwidth.device.schema.magnitudes import ValueRule
 from zwidth.device.schema.value_types import (
     LARGEST,
     Axis,
@@ -37,9 +37,9 @@ from zwidth.device.schema.value_types import (
     Inertia,
     MassMatrix,
     StiffnessMatrix,
+    ValueRule,
     Vector,
 )
-from zwidth.device.validation_messages import without_unsupported
 from zwidth.model.design_axes import join_designs
 
 
@@ -199,3 +199,47 @@ def _may_be(document: Document, steps: KeyPath, number: float) -> bool:
     except ValidationError:
         return False
     return True
+
+
+COMPOSED: Final = frozenset({"cylindrical", "planar", "screw", "helical"})
+UNSUPPORTED_VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
+    ("loop", "velocity", "method"): (
+        frozenset({"measured"}),
+        "backward-difference",
+        frozenset({"filter"}),
+    ),
+    ("mechanism", "links", "*", "joint"): (COMPOSED, "revolute", None),
+    ("mechanism", "legs", "*", "links", "*", "joint"): (COMPOSED, "revolute", None),
+}
+"""Key -> the values to refuse so, the supported one that stands for them while the rest is checked, and the keys
+beside it that are checked with it (None: all); what is left out are parameters of the refused value."""
+
+
+def without_unsupported(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[KeyPath, str]]]:
+    """The document without what is not supported yet, and a sentence for each thing taken out."""
+    document = deep_copy(document)
+    refused: list[tuple[KeyPath, str]] = []
+    for pattern, (names, stand_in, beside) in UNSUPPORTED_VALUES.items():
+        for path, holder in _places(document, pattern):
+            value = holder[pattern[-1]]
+            if isinstance(value, str) and value.lower() in names:
+                for key in [] if beside is None else holder.keys() - beside:
+                    del holder[key]
+                holder[pattern[-1]] = stand_in
+                refused.append((path, f"{pattern[-1]} '{value}' is not supported yet; use '{stand_in}'"))
+    return document, refused
+
+
+def _places(
+    document: Any, pattern: tuple[str, ...], path: KeyPath = ()
+) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    """Path of each key that a pattern (* for each list element) leads to, and the table that holds it."""
+    first, rest = pattern[0], pattern[1:]
+    if first == "*":
+        for index, inner in enumerate(document if isinstance(document, list) else []):
+            yield from _places(inner, rest, (*path, index))
+    elif isinstance(document, dict) and first in document:
+        if not rest:
+            yield (*path, first), document
+        else:
+            yield from _places(document[first], rest, (*path, first))

@@ -6,18 +6,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from zwidth.device.schema import magnitudes
-from zwidth.device.schema.value_types import Few, Number, Section, WholeNumber, documented_key
+from zwidth.device.schema import value_types
+from zwidth.device.schema.value_types import Section, documented_key
 
-Positive = Annotated[Number, Field(gt=0.0)]
-Length = Annotated[Positive, magnitudes.within(magnitudes.THINNEST, magnitudes.THICKEST, "m")]
-Stiffness = Annotated[Positive, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "")]
-Modulus = Annotated[Positive, magnitudes.within(magnitudes.LEAST_MODULUS, magnitudes.LARGEST_MODULUS, "Pa")]
-MassPerLength = Annotated[Positive, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg/m")]
+Positive = Annotated[value_types.Number, Field(gt=0.0)]
+Length = Annotated[Positive, value_types.within(value_types.THINNEST, value_types.THICKEST, "m")]
+Stiffness = Annotated[Positive, value_types.within(value_types.SOFTEST, value_types.STIFFEST, "")]
+Modulus = Annotated[Positive, value_types.within(value_types.LEAST_MODULUS, value_types.LARGEST_MODULUS, "Pa")]
+MassPerLength = Annotated[Positive, value_types.within(value_types.LIGHTEST, value_types.HEAVIEST, "kg/m")]
 InertiaPerLength = Annotated[
-    Positive, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m")
+    Positive, value_types.within(value_types.LEAST_INERTIA, value_types.LARGEST_INERTIA, "kg m")
 ]
-Density = Annotated[Positive, magnitudes.within(magnitudes.LEAST_DENSITY, magnitudes.LARGEST_DENSITY, "kg/m³")]
+Density = Annotated[Positive, value_types.within(value_types.LEAST_DENSITY, value_types.LARGEST_DENSITY, "kg/m³")]
 
 
 class RodShape(Section):
@@ -85,7 +85,7 @@ class BeamSection(Section):
     material: GivenMaterial | None = documented_key(
         "typical values of a material by its name, or its own numbers", default=None
     )
-    bending_stiffness_Nm2: Annotated[Few[Stiffness], Field(max_length=2)] | None = documented_key(
+    bending_stiffness_Nm2: Annotated[value_types.Few[Stiffness], Field(max_length=2)] | None = documented_key(
         "E I; or two, of bending in the link's x-z and in its x-y plane", "N m^2", default=None
     )
     torsion_stiffness_Nm2: Stiffness | None = documented_key("G J", "N m^2", default=None)
@@ -94,7 +94,7 @@ class BeamSection(Section):
     torsional_inertia_per_length_kg_m: InertiaPerLength | None = documented_key(
         "moment of inertia about its axis per length", "kg m", default=None
     )
-    damping_time_s: Number = documented_key(
+    damping_time_s: value_types.Number = documented_key(
         "damping of the beam's own: this times its stiffness, beside mechanism.damping", "s", ge=0, default=0.0
     )
     method: Literal["assumed-modes", "finite-elements", "lumped"] = documented_key(
@@ -102,13 +102,13 @@ class BeamSection(Section):
         'Bampton; "lumped", a mass at its tip',
         default="assumed-modes",
     )
-    modes: WholeNumber | None = documented_key(
+    modes: value_types.WholeNumber | None = documented_key(
         "of assumed modes in each plane, of twist and of stretch; of finite elements those kept beside the static "
         "deflections; omitted: 2",
         ge=0,
         le=20,
         default=None,
     )
-    elements: WholeNumber | None = documented_key(
+    elements: value_types.WholeNumber | None = documented_key(
         "number of finite elements; omitted: 8", ge=1, le=100, default=None
     )

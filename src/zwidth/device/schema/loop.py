@@ -21,17 +21,8 @@ from pydantic import (
 )
 
 from zwidth.device.faults import quote
-from zwidth.device.schema import magnitudes
-from zwidth.device.schema.value_types import (
-    DryFriction,
-    Mass,
-    Number,
-    NumberOrInfinity,
-    Section,
-    Step,
-    WholeNumber,
-    documented_key,
-)
+from zwidth.device.schema import value_types
+from zwidth.device.schema.value_types import Section, documented_key
 from zwidth.loop.controller import MOST_FAST_SAMPLES
 from zwidth.loop.estimators import METHODS
 from zwidth.loop.estimators.foaw import LONGEST_WINDOW
@@ -45,15 +36,19 @@ class FirstOrderFilter(Section):
     """First-order low pass by backward Euler, a = tau / (tau + T)."""
 
     type: Literal["first-order"] = documented_key('kind of filter: "first-order" or "butterworth"')
-    time_constant_s: Number = documented_key("time constant tau; 0: no filter", "s", ge=0)
+    time_constant_s: value_types.Number = documented_key("time constant tau; 0: no filter", "s", ge=0)
 
 
 class ButterworthFilter(Section):
     """Butterworth low pass by the bilinear (Tustin) rule."""
 
     type: Literal["butterworth"] = documented_key('kind of filter: "first-order" or "butterworth"')
-    order: WholeNumber = documented_key("order, a whole number from 1 to 20", usual=2, ge=1, le=HIGHEST_ORDER)
-    cutoff_Hz: Number = documented_key("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
+    order: value_types.WholeNumber = documented_key(
+        "order, a whole number from 1 to 20", usual=2, ge=1, le=HIGHEST_ORDER
+    )
+    cutoff_Hz: value_types.Number = documented_key(
+        "cutoff frequency, below half the sampling frequency", "Hz", gt=0
+    )
     discretisation: Literal["tustin", "tustin-prewarped"] = documented_key(
         "bilinear rule, plain or prewarped at the cutoff", default="tustin"
     )
@@ -103,14 +98,14 @@ class WindowedDifferenceSection(_Method):
     """(x_j - x_{j-n}) / (n T)"""
 
     method: Literal["windowed-difference"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=1, le=LONGEST_WINDOW)
+    samples: value_types.WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=1, le=LONGEST_WINDOW)
 
 
 class LeastSquaresSlopeSection(_Method):
     """Slope of the line through the newest n positions."""
 
     method: Literal["least-squares-slope"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=2, le=LONGEST_WINDOW)
+    samples: value_types.WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=2, le=LONGEST_WINDOW)
 
 
 class CentralDifferenceSection(_Method):
@@ -123,8 +118,8 @@ class SavitzkyGolaySection(_Method):
     """Slope of the polynomial through the newest n positions."""
 
     method: Literal["savitzky-golay"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=2, le=LONGEST_WINDOW)
-    order: WholeNumber = documented_key(
+    samples: value_types.WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=2, le=LONGEST_WINDOW)
+    order: value_types.WholeNumber = documented_key(
         '"savitzky-golay": degree of the polynomial, a whole number from 1 to 10',
         "1",
         usual=2,
@@ -152,10 +147,10 @@ class AlphaBetaSection(_Method):
     """A tracker that corrects its position and velocity by shares of its error."""
 
     method: Literal["alpha-beta"] = documented_key(_METHOD)
-    alpha: Number = documented_key(
+    alpha: value_types.Number = documented_key(
         '"alpha-beta": share of the error given to the position, below 2', "1", usual=0.6, gt=0, lt=2
     )
-    beta: Number = documented_key(
+    beta: value_types.Number = documented_key(
         '"alpha-beta": share of the error given, over T, to the velocity, below 4 - 2 alpha',
         "1",
         usual=0.2,
@@ -168,18 +163,18 @@ class KalmanSection(_Method):
     """The alpha-beta filter with the gains that two noise figures call for."""
 
     method: Literal["kalman"] = documented_key(_METHOD)
-    acceleration_noise_m_per_s2: Number = documented_key(
+    acceleration_noise_m_per_s2: value_types.Number = documented_key(
         '"kalman": standard deviation of the accelerations to expect', "m/s^2", usual=10.0, gt=0
     )
-    position_noise_m: Number | None = documented_key(_NOISE, "m", usual=1e-5, gt=0, default=None)
+    position_noise_m: value_types.Number | None = documented_key(_NOISE, "m", usual=1e-5, gt=0, default=None)
 
 
 class FoawSection(_Method):
     """Slope of the longest window that a line fits within the noise; it has no chart."""
 
     method: Literal["foaw"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=1, le=LONGEST_WINDOW)
-    position_noise_m: Number | None = documented_key(_NOISE, "m", usual=1e-5, gt=0, default=None)
+    samples: value_types.WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=1, le=LONGEST_WINDOW)
+    position_noise_m: value_types.Number | None = documented_key(_NOISE, "m", usual=1e-5, gt=0, default=None)
     fit: Literal["end-fit", "best-fit"] = documented_key(
         '"foaw": "end-fit", the line through the ends of the window, or "best-fit", the least-squares line',
         default="end-fit",
@@ -190,7 +185,7 @@ class LevantSection(_Method):
     """The tracker that is exact for accelerations up to a bound; it has no chart."""
 
     method: Literal["levant"] = documented_key(_METHOD)
-    acceleration_max_m_per_s2: Number = documented_key(
+    acceleration_max_m_per_s2: value_types.Number = documented_key(
         '"levant": largest acceleration to expect', "m/s^2", usual=20.0, gt=0
     )
 
@@ -249,7 +244,7 @@ class ForceSection(Section):
 class ActuatorSection(Section):
     """How the force follows its command."""
 
-    time_constant_s: Number = documented_key(
+    time_constant_s: value_types.Number = documented_key(
         "time constant tau of the force's first-order lag, tau f' + f = held command; 0: none", "s", ge=0
     )
 
@@ -262,13 +257,13 @@ class EncoderSection(Section):
         "which are the same with rigid links; a [plant] says it by `sensor`",
         default=None,
     )
-    resolution_m: Step | None = documented_key(
+    resolution_m: value_types.Step | None = documented_key(
         "step of the reading, for a [plant]; 0: as fine as you like; a mechanism gives encoder_counts_per_rev",
         "m",
         usual=1e-4,
         default=None,
     )
-    noise_m: Step | None = documented_key(
+    noise_m: value_types.Step | None = documented_key(
         "standard deviation of the reading before it is rounded, for a [plant]; omitted: 0",
         "m",
         usual=1e-4,
@@ -279,13 +274,15 @@ class EncoderSection(Section):
 class SaturationSection(Section):
     """The largest force that the computer commands."""
 
-    force_N: NumberOrInfinity = documented_key("largest force that is commanded; inf: no limit", "N", gt=0)
+    force_N: value_types.NumberOrInfinity = documented_key(
+        "largest force that is commanded; inf: no limit", "N", gt=0
+    )
 
 
 class LoopSection(Section):
     """The sampled wall law, f = -F (K y + B v)."""
 
-    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] | None = documented_key(
+    sampling_period_s: Annotated[value_types.Number, BeforeValidator(_a_period)] | None = documented_key(
         "sampling period T, 1e-7 <= T <= 1; omitted, of a [mechanism]: not known, which leaves answers without a "
         "computer",
         "s",
@@ -293,14 +290,14 @@ class LoopSection(Section):
         le=LONGEST_PERIOD,
         default=None,
     )
-    delay_samples: Number | None = documented_key(
+    delay_samples: value_types.Number | None = documented_key(
         "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",
         "1",
         usual=1.0,
         ge=0,
         default=None,
     )
-    delay_s: Number | None = documented_key(
+    delay_s: value_types.Number | None = documented_key(
         "time from reading the encoder to setting the force; or delay_samples", "s", ge=0, default=None
     )
     velocity: VelocitySection = documented_key(
@@ -331,17 +328,17 @@ _VELOCITY: Final = "how it estimates the velocity, with the keys of [loop.veloci
 class ForceSensorSection(Section):
     """A force sensor between hand and device, whose reading f is fed back."""
 
-    gain: Number = documented_key("G: force commanded per force measured, above -1", "1", gt=-1)
+    gain: value_types.Number = documented_key("G: force commanded per force measured, above -1", "1", gt=-1)
     law: Literal["force-feedforward", "force-error"] = documented_key(
         '"force-feedforward": wall + G f, the motors help the hand; "force-error": wall + G (f + wall), f is '
         "controlled to what the wall asks for",
         default="force-feedforward",
     )
     filter: LowPass | None = documented_key("low pass on what G is applied to; omitted: none", default=None)
-    delay_samples: WholeNumber = documented_key(
+    delay_samples: value_types.WholeNumber = documented_key(
         "whole samples that the measured force is late", "1", ge=0, le=MOST_SAMPLES, default=0
     )
-    mass_beyond_kg: Mass = documented_key(
+    mass_beyond_kg: value_types.Mass = documented_key(
         "part of the device's mass at the handle that lies between sensor and hand", "kg", ge=0, default=0.0
     )
 
@@ -349,10 +346,10 @@ class ForceSensorSection(Section):
 class FeedforwardSection(Section):
     """Feedforward of the device's own inertia and friction along the rendered direction."""
 
-    inertia_kg: Mass | None = documented_key(
+    inertia_kg: value_types.Mass | None = documented_key(
         "mass that is cancelled, through the estimated acceleration; or inertia_share", "kg", ge=0, default=None
     )
-    inertia_share: Number | None = documented_key(
+    inertia_share: value_types.Number | None = documented_key(
         "the same as a share of the device's rigid mass at its posture, up to 2; or inertia_kg",
         "1",
         ge=0,
@@ -362,19 +359,19 @@ class FeedforwardSection(Section):
     acceleration_filter: LowPass | None = documented_key(
         "low pass on the difference of two estimated velocities over T; required with an inertia", default=None
     )
-    damping_Ns_per_m: Number = documented_key(
+    damping_Ns_per_m: value_types.Number = documented_key(
         "viscous friction that is cancelled, through the estimated velocity",
         "N s/m",
         ge=0,
-        le=magnitudes.STRONGEST_DAMPING,
+        le=value_types.STRONGEST_DAMPING,
         default=0.0,
     )
-    coulomb_N: DryFriction = documented_key(
+    coulomb_N: value_types.DryFriction = documented_key(
         "dry friction that is cancelled, by the sign of the estimated velocity; not linear: in simulations only",
         "N",
         default=0.0,
     )
-    deadband_m_per_s: Number | None = documented_key(
+    deadband_m_per_s: value_types.Number | None = documented_key(
         "estimated speed up to which that sign is 0; omitted: 0", "m/s", ge=0, default=None
     )
     velocity: VelocitySection | None = documented_key(_VELOCITY, default=None)
@@ -383,20 +380,20 @@ class FeedforwardSection(Section):
 class LocalSection(Section):
     """A fast loop on the same encoder, round which the wall's loop is the slow one."""
 
-    rate_multiple: WholeNumber = documented_key(
+    rate_multiple: value_types.WholeNumber = documented_key(
         f"N: its rate over the wall's, a whole number from 1 to {MOST_FAST_SAMPLES}",
         "1",
         ge=1,
         le=MOST_FAST_SAMPLES,
     )
-    stiffness_N_per_m: Number = documented_key(
-        "its spring to the reading 0", "N/m", ge=-magnitudes.STIFFEST, le=magnitudes.STIFFEST, default=0.0
+    stiffness_N_per_m: value_types.Number = documented_key(
+        "its spring to the reading 0", "N/m", ge=-value_types.STIFFEST, le=value_types.STIFFEST, default=0.0
     )
-    damping_Ns_per_m: Number = documented_key(
-        "its damper", "N s/m", ge=-magnitudes.STRONGEST_DAMPING, le=magnitudes.STRONGEST_DAMPING, default=0.0
+    damping_Ns_per_m: value_types.Number = documented_key(
+        "its damper", "N s/m", ge=-value_types.STRONGEST_DAMPING, le=value_types.STRONGEST_DAMPING, default=0.0
     )
     velocity: VelocitySection | None = documented_key(f"{_VELOCITY}; at its own rate", default=None)
-    delay_samples: Number = documented_key(
+    delay_samples: value_types.Number = documented_key(
         "time from its reading to its force, in its own samples, whole or not",
         "1",
         usual=1.0,

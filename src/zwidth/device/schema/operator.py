@@ -7,29 +7,35 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from zwidth.device.schema import magnitudes
+from zwidth.device.schema import value_types
 from zwidth.device.schema.mechanism import AssemblySection, LinkSection
-from zwidth.device.schema.value_types import Damper, Name, Number, Section, Text, Triple, documented_key
+from zwidth.device.schema.value_types import Section, documented_key
 
-ArmMass = Annotated[Number, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg", "0 (massless) or ")]
-Stiffness = Annotated[Number, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "N/m", "0 (none) or ")]
+ArmMass = Annotated[
+    value_types.Number, value_types.within(value_types.LIGHTEST, value_types.HEAVIEST, "kg", "0 (massless) or ")
+]
+Stiffness = Annotated[
+    value_types.Number, value_types.within(value_types.SOFTEST, value_types.STIFFEST, "N/m", "0 (none) or ")
+]
 
 
 class OperatorSection(Section):
     """Five numbers: a mass on a spring and a damper to the ground, held to the handle by another such pair."""
 
-    name: Text | None = documented_key("what to call it; omitted: as given", default=None)
+    name: value_types.Text | None = documented_key("what to call it; omitted: as given", default=None)
     description: str = documented_key("one line on whose arm and which grasp it is", default="")
     source: str = documented_key("one line on where the numbers come from", default="")
     arm_mass_kg: ArmMass = documented_key("mass of hand and arm; 0 only with a rigid grasp", "kg", ge=0)
     arm_stiffness_N_per_m: Stiffness = documented_key(
         "stiffness of the arm to the ground", "N/m", ge=0, default=0.0
     )
-    arm_damping_Ns_per_m: Damper = documented_key("damping of the arm to the ground", "N s/m", ge=0, default=0.0)
+    arm_damping_Ns_per_m: value_types.Damper = documented_key(
+        "damping of the arm to the ground", "N s/m", ge=0, default=0.0
+    )
     grasp_stiffness_N_per_m: Stiffness | None = documented_key(
         'stiffness of the grasp, from arm to handle; or grasp = "rigid"', "N/m", ge=0, default=None
     )
-    grasp_damping_Ns_per_m: Damper | None = documented_key(
+    grasp_damping_Ns_per_m: value_types.Damper | None = documented_key(
         "damping of the grasp, beside its stiffness; omitted: none", "N s/m", ge=0, default=None
     )
     directions: Literal["rendered", "all"] = documented_key(
@@ -45,14 +51,16 @@ class OperatorSection(Section):
 class HandSection(Section):
     """Which part of the arm holds the handle."""
 
-    link: Name = documented_key("the link that holds the handle")
-    point_m: Triple | None = documented_key("the hand in that link's frame; omitted: its tip", "m", default=None)
+    link: value_types.Name = documented_key("the link that holds the handle")
+    point_m: value_types.Triple | None = documented_key(
+        "the hand in that link's frame; omitted: its tip", "m", default=None
+    )
 
 
 class ArmSection(Section):
     """An arm: links with joints whose springs and dampers are the muscles', and a grasp."""
 
-    name: Text | None = documented_key("what to call it; omitted: as given", default=None)
+    name: value_types.Text | None = documented_key("what to call it; omitted: as given", default=None)
     description: str = documented_key("one line on whose arm it is", default="")
     source: str = documented_key("one line on where the numbers come from", default="")
     links: tuple[LinkSection, ...] = documented_key(
@@ -64,7 +72,7 @@ class ArmSection(Section):
     posture: AssemblySection = documented_key(
         "angles of its joints as it holds the handle; with shoulder_m about these"
     )
-    shoulder_m: Triple | None = documented_key(
+    shoulder_m: value_types.Triple | None = documented_key(
         "place of its base in the device's base frame; omitted: wherever it has the hand at the handle in this "
         "posture",
         "m",
@@ -76,6 +84,6 @@ class ArmSection(Section):
     grasp_stiffness_N_per_m: Stiffness | None = documented_key(
         'stiffness of the grasp in every direction; or grasp = "rigid"', "N/m", ge=0, default=None
     )
-    grasp_damping_Ns_per_m: Damper | None = documented_key(
+    grasp_damping_Ns_per_m: value_types.Damper | None = documented_key(
         "damping of the grasp, beside its stiffness; omitted: none", "N s/m", ge=0, default=None
     )

@@ -2,11 +2,16 @@
 
 Numbers are strict (no text, no true or false) and finite unless said otherwise. Where a shorter form may
 stand for a vector or a matrix (one number for n = 1, three moments for an inertia), it is written out here.
+
+How large and how small numbers may be: beyond that a unit has slipped, and rounding would give the answers. The
+bounds are far outside every device. They stand for powers of the numbers, too: what is within them can be squared,
+divided and summed in double precision with digits to spare.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
@@ -24,15 +29,153 @@ from pydantic import (
 from zwidth.arrays import Floats
 from zwidth.device.faults import quote
 from zwidth.device.read import FILE_VERSION
-from zwidth.device.schema import magnitudes
+
+Rows = tuple[tuple[float, ...], ...]
+
+LIGHTEST: Final = 1e-12  # kg
+HEAVIEST: Final = 1e12  # kg
+LEAST_INERTIA: Final = 1e-18  # kg m²
+LARGEST_INERTIA: Final = 1e12  # kg m²
+SOFTEST: Final = 1e-12  # N/m or N m/rad, of a spring there is
+STIFFEST: Final = 1e15  # N/m or N m/rad, of a spring there is
+STRONGEST_DAMPING: Final = 1e15  # N s/m or N m s/rad
+LEAST_RATIO: Final = 1e-6  # motor turns per joint turn
+LARGEST_RATIO: Final = 1e6  # motor turns per joint turn
+LEAST_RESISTANCE: Final = 1e-9  # ohm
+LARGEST_RESISTANCE: Final = 1e12  # ohm
+LEAST_INDUCTANCE: Final = 1e-15  # H
+LARGEST_INDUCTANCE: Final = 1e6  # H
+LEAST_LOSS: Final = 1e-5  # of the stiffness, of a loss factor there is
+LARGEST_LOSS: Final = 10.0
+LEAST_FRICTION: Final = 1e-12  # N or N m, of dry friction there is
+LARGEST_FRICTION: Final = 1e12  # N or N m
+LEAST_TORQUE: Final = 1e-12  # N m, of a motor
+LARGEST_TORQUE: Final = 1e12  # N m, of a motor
+SLOWEST: Final = 1e-12  # m/s or rad/s, of a Stribeck velocity
+FASTEST: Final = 1e12  # m/s or rad/s, of a Stribeck velocity
+FINEST: Final = 1e-15  # m or rad, of an encoder's step or noise there is
+COARSEST: Final = 1e3  # m or rad, of an encoder's step or noise there is
+MOST_COUNTS: Final = 1e12  # per revolution
+THINNEST: Final = 1e-9  # m, of a section
+THICKEST: Final = 1e3  # m, of a section
+LEAST_MODULUS: Final = 1e-3  # Pa
+LARGEST_MODULUS: Final = 1e24  # Pa
+LEAST_DENSITY: Final = 1e-6  # kg/m³
+LARGEST_DENSITY: Final = 1e9  # kg/m³
+HARDEST: Final = 1e30  # N/m³ or N m/rad³, in either sign
+LEAST_SHARE: Final = 1e-9  # of a coordinate in what is driven or read
+LARGEST_SHARE: Final = 1e9  # of a coordinate in what is driven or read
+
+
+def within(least: float, most: float, unit: str, besides: str = "") -> AfterValidator:
+    """A positive number between two bounds; zero, negative numbers and inf are left to other checks.
+
+    besides  what else is allowed, for the sentence: "0 (massless) or "
+    """
+
+    def check(value: float) -> float:
+        """The number itself. Raises ValueError where it is positive, finite and out of bounds."""
+        if 0 < value < np.inf and not least <= value <= most:
+            raise ValueError(
+                f"must be {besides}{_between(least, most, unit)}, got {value:.6g}; is the unit right?"
+            )
+        return value
+
+    return AfterValidator(check)
+
+
+Judgement = tuple[Any, Callable[[], str]]
+
+
+@dataclass(frozen=True)
+class ValueRule:
+    """What a vector or a matrix must be, of a file or of many designs.
+
+    judge  of (..., n) or (..., n, n): whether each breaks the rule (...), and what to say of one that does
+    """
+
+    judge: Callable[[Floats], Judgement]
+
+    def __call__(self, value: Any) -> Any:
+        """The numbers of a file, checked. Raises ValueError."""
+        with np.errstate(all="ignore"):  # of numbers that other rules call too large
+            broken, sentence = self.judge(np.array(value))
+        if broken:
+            raise ValueError(sentence())
+        return value
+
+
+def principal_within(least: float, most: float, unit: str) -> AfterValidator:
+    """A positive definite matrix whose eigenvalues, the masses of its principal motions, lie between bounds."""
+
+    def judge(matrix: Floats) -> Judgement:
+        """Whether an eigenvalue of matrices (..., n, n) is out of bounds, and the sentence of one."""
+        values = np.linalg.eigvalsh(matrix)
+        low, high = values[..., 0], values[..., -1]
+
+        def sentence() -> str:
+            """What is wrong with the one matrix (n, n) that was judged."""
+            one = matrix.shape[-1] == 1
+            got = f", got {low:.6g}" if one else f" for every motion, got masses from {low:.6g} to {high:.6g}"
+            return f"must be {_between(least, most, unit)}{got}; is the unit right?"
+
+        return ~((least <= low) & (high <= most)), sentence
+
+    return AfterValidator(ValueRule(judge))
+
+
+def largest_within(least: float, most: float, unit: str, besides: str) -> AfterValidator:
+    """A matrix that is zero, or has its largest eigenvalue between bounds: a body's moments of inertia."""
+
+    def judge(matrix: Floats) -> Judgement:
+        """Whether the largest eigenvalue of matrices (..., n, n) is out of bounds, and the sentence of one."""
+        moment = np.linalg.eigvalsh(matrix)[..., -1]
+        return (moment > 0.0) & ~(
+            (least <= moment) & (moment <= most)
+        ), lambda: f"must be {besides}{_between(least, most, unit)}, got {moment:.6g}; is the unit right?"
+
+    return AfterValidator(ValueRule(judge))
+
+
+def elements_up_to(most: float, unit: str) -> AfterValidator:
+    """A matrix without elements beyond a bound, in either sign."""
+
+    def judge(matrix: Floats) -> Judgement:
+        """Whether an element of matrices (..., n, n) is too large, and the sentence of one."""
+        return (
+            np.abs(matrix).max(axis=(-2, -1)) > most,
+            lambda: f"must be at most {most:g} {unit} in size, got {_largest(matrix):.6g}; is the unit right?",
+        )
+
+    return AfterValidator(ValueRule(judge))
+
+
+def largest_share_within(least: float, most: float) -> AfterValidator:
+    """A vector whose largest component has a size between bounds; one of zeros is left to another rule."""
+
+    def judge(vector: Floats) -> Judgement:
+        """Whether the largest size in vectors (..., n) is out of bounds and not 0, and the sentence of one."""
+        size = np.abs(vector).max(axis=-1)
+        return (size != 0.0) & ~(
+            (least <= size) & (size <= most)
+        ), lambda: f"must have a largest number of size {least:g} to {most:g}, got {_largest(vector):.6g}"
+
+    return AfterValidator(ValueRule(judge))
+
+
+def _largest(values: Floats) -> float:
+    return max(values.ravel().tolist(), key=abs)
+
+
+def _between(least: float, most: float, unit: str) -> str:
+    return f"between {least:g} and {most:g} {unit}".rstrip()
+
 
 SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
 LARGEST: Final = 1e30  # SI units; the squares of such numbers can still be multiplied
 NAME_PATTERN: Final = r"^[^\W\d][\w-]*$"  # no dots and no leading digit: names are steps of dotted paths
 
 INERTIA_FORMS: Final = "one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers"
-
-Rows = magnitudes.Rows
 
 
 class Section(BaseModel):
@@ -74,11 +217,11 @@ def _zeros(vector: Floats) -> Any:
     return ~(vector != 0.0).any(axis=-1)
 
 
-def _not_zero(vector: Floats) -> magnitudes.Judgement:
+def _not_zero(vector: Floats) -> Judgement:
     return _zeros(vector), lambda: f"must not be all zeros, got {quote(vector.tolist())}"
 
 
-def _has_length(vector: Floats) -> magnitudes.Judgement:
+def _has_length(vector: Floats) -> Judgement:
     """Whether vectors (..., n) are all zeros, which breaks the rule, and the sentence of one that is."""
     return _zeros(
         vector
@@ -151,7 +294,7 @@ def _square(rows: Rows) -> Rows:
     return rows
 
 
-def _symmetric(matrix: Floats) -> magnitudes.Judgement:
+def _symmetric(matrix: Floats) -> Judgement:
     """Whether matrices (..., n, n) are not symmetric, rounding apart, and the sentence of one."""
     gap = np.abs(matrix - np.swapaxes(matrix, -1, -2))
 
@@ -166,7 +309,7 @@ def _symmetric(matrix: Floats) -> magnitudes.Judgement:
     return gap.max(axis=(-2, -1)) > SYMMETRY_TOLERANCE * np.abs(matrix).max(axis=(-2, -1)), sentence
 
 
-def _positive_definite(matrix: Floats) -> magnitudes.Judgement:
+def _positive_definite(matrix: Floats) -> Judgement:
     """Whether symmetric matrices (..., n, n) are not positive definite, and the sentence of one."""
     size, eigenvalues = matrix.shape[-1], np.linalg.eigvalsh(matrix)
     least = eigenvalues[..., 0]
@@ -188,7 +331,7 @@ def _one_or_three(rows: Rows) -> Rows:
     return rows
 
 
-def _possible_body(matrix: Floats) -> magnitudes.Judgement:
+def _possible_body(matrix: Floats) -> Judgement:
     """Whether inertias (..., 3, 3) or (..., 1, 1) are those of no body: a principal moment is negative, or above
     the sum of the others, rounding apart; and the sentence of one."""
     if matrix.shape[-1] == 1:
@@ -210,8 +353,8 @@ def _possible_body(matrix: Floats) -> magnitudes.Judgement:
     return negative | (moments[..., 2] > moments[..., 0] + moments[..., 1] + slack), sentence
 
 
-def _rule(judge: Callable[[Floats], magnitudes.Judgement]) -> AfterValidator:
-    return AfterValidator(magnitudes.ValueRule(judge))
+def _rule(judge: Callable[[Floats], Judgement]) -> AfterValidator:
+    return AfterValidator(ValueRule(judge))
 
 
 _NUMBER: Final[dict[str, Any]] = {"type": "number"}
@@ -221,46 +364,34 @@ _THREE: Final[dict[str, Any]] = {"type": "array", "items": _NUMBER, "minItems": 
 _THREE_BY_THREE: Final[dict[str, Any]] = {"type": "array", "items": _THREE, "minItems": 3, "maxItems": 3}
 
 Number = Annotated[float, Strict(), AllowInfNan(False), AfterValidator(_thinkable)]
-Mass = Annotated[Number, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg", "0 (massless) or ")]
-RotorInertia = Annotated[
-    Number, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m²", "0 (no inertia) or ")
-]
-Ratio = Annotated[
-    Number, magnitudes.within(magnitudes.LEAST_RATIO, magnitudes.LARGEST_RATIO, "motor turns per joint turn")
-]
+Mass = Annotated[Number, within(LIGHTEST, HEAVIEST, "kg", "0 (massless) or ")]
+RotorInertia = Annotated[Number, within(LEAST_INERTIA, LARGEST_INERTIA, "kg m²", "0 (no inertia) or ")]
+Ratio = Annotated[Number, within(LEAST_RATIO, LARGEST_RATIO, "motor turns per joint turn")]
 Ratios = Annotated[tuple[Annotated[Ratio, Field(gt=0.0)], ...], Field(min_length=2)]
-Damper = Annotated[Number, magnitudes.within(0.0, magnitudes.STRONGEST_DAMPING, "N m s/rad")]
-Resistance = Annotated[
-    Number, magnitudes.within(magnitudes.LEAST_RESISTANCE, magnitudes.LARGEST_RESISTANCE, "ohm", "0 or ")
-]
+Damper = Annotated[Number, within(0.0, STRONGEST_DAMPING, "N m s/rad")]
+Resistance = Annotated[Number, within(LEAST_RESISTANCE, LARGEST_RESISTANCE, "ohm", "0 or ")]
 LossFactor = Annotated[
     Number,
-    Field(ge=0.0, le=magnitudes.LARGEST_LOSS),
-    magnitudes.within(magnitudes.LEAST_LOSS, magnitudes.LARGEST_LOSS, "of the stiffness", "0 (none) or "),
+    Field(ge=0.0, le=LARGEST_LOSS),
+    within(LEAST_LOSS, LARGEST_LOSS, "of the stiffness", "0 (none) or "),
 ]
-Inductance = Annotated[
-    Number, magnitudes.within(magnitudes.LEAST_INDUCTANCE, magnitudes.LARGEST_INDUCTANCE, "H", "0 or ")
-]
+Inductance = Annotated[Number, within(LEAST_INDUCTANCE, LARGEST_INDUCTANCE, "H", "0 or ")]
 NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan), AfterValidator(_thinkable)]
-Spring = Annotated[
-    NumberOrInfinity, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "N m/rad", "inf (rigid) or ")
-]
-Stiffness = Annotated[Number, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "N m/rad")]
+Spring = Annotated[NumberOrInfinity, within(SOFTEST, STIFFEST, "N m/rad", "inf (rigid) or ")]
+Stiffness = Annotated[Number, within(SOFTEST, STIFFEST, "N m/rad")]
 DryFriction = Annotated[
     Number,
     Field(ge=0.0),
-    magnitudes.within(magnitudes.LEAST_FRICTION, magnitudes.LARGEST_FRICTION, "", "0 (none) or "),
+    within(LEAST_FRICTION, LARGEST_FRICTION, "", "0 (none) or "),
 ]
-StribeckVelocity = Annotated[Number, Field(gt=0.0), magnitudes.within(magnitudes.SLOWEST, magnitudes.FASTEST, "")]
-Bristle = Annotated[Number, Field(gt=0.0), magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "")]
-BristleDamper = Annotated[Number, Field(ge=0.0), magnitudes.within(0.0, magnitudes.STRONGEST_DAMPING, "")]
-Torque = Annotated[Number, magnitudes.within(magnitudes.LEAST_TORQUE, magnitudes.LARGEST_TORQUE, "N m")]
-Step = Annotated[
-    Number, Field(ge=0.0), magnitudes.within(magnitudes.FINEST, magnitudes.COARSEST, "", "0 (none) or ")
-]
-Hardening = Annotated[Number, Field(ge=-magnitudes.HARDEST, le=magnitudes.HARDEST)]
-Excess = Annotated[Number, Field(ge=-magnitudes.STIFFEST, le=magnitudes.STIFFEST)]
-Counts = Annotated[Number, Field(gt=0.0), magnitudes.within(1e-3, magnitudes.MOST_COUNTS, "per revolution")]
+StribeckVelocity = Annotated[Number, Field(gt=0.0), within(SLOWEST, FASTEST, "")]
+Bristle = Annotated[Number, Field(gt=0.0), within(SOFTEST, STIFFEST, "")]
+BristleDamper = Annotated[Number, Field(ge=0.0), within(0.0, STRONGEST_DAMPING, "")]
+Torque = Annotated[Number, within(LEAST_TORQUE, LARGEST_TORQUE, "N m")]
+Step = Annotated[Number, Field(ge=0.0), within(FINEST, COARSEST, "", "0 (none) or ")]
+Hardening = Annotated[Number, Field(ge=-HARDEST, le=HARDEST)]
+Excess = Annotated[Number, Field(ge=-STIFFEST, le=STIFFEST)]
+Counts = Annotated[Number, Field(gt=0.0), within(1e-3, MOST_COUNTS, "per revolution")]
 WholeNumber = Annotated[int, Strict()]
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=NAME_PATTERN)]
@@ -278,7 +409,7 @@ Vector = Annotated[
     tuple[Number, ...],
     BeforeValidator(_as_vector),
     _rule(_not_zero),
-    magnitudes.largest_share_within(magnitudes.LEAST_SHARE, magnitudes.LARGEST_SHARE),
+    largest_share_within(LEAST_SHARE, LARGEST_SHARE),
     WithJsonSchema({"anyOf": [_NUMBER, _LIST]}),
 ]
 Item = TypeVar("Item")
@@ -295,10 +426,10 @@ SymmetricMatrix = Annotated[
 MassMatrix = Annotated[
     SymmetricMatrix,
     _rule(_positive_definite),
-    magnitudes.principal_within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg"),
+    principal_within(LIGHTEST, HEAVIEST, "kg"),
 ]
-DampingMatrix = Annotated[SymmetricMatrix, magnitudes.elements_up_to(magnitudes.STRONGEST_DAMPING, "N s/m")]
-StiffnessMatrix = Annotated[SymmetricMatrix, magnitudes.elements_up_to(magnitudes.STIFFEST, "N/m")]
+DampingMatrix = Annotated[SymmetricMatrix, elements_up_to(STRONGEST_DAMPING, "N s/m")]
+StiffnessMatrix = Annotated[SymmetricMatrix, elements_up_to(STIFFEST, "N/m")]
 Inertia = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_inertia),
@@ -306,6 +437,6 @@ Inertia = Annotated[
     _rule(_symmetric),
     AfterValidator(_one_or_three),
     _rule(_possible_body),
-    magnitudes.largest_within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m²", "0 (no inertia) or "),
+    largest_within(LEAST_INERTIA, LARGEST_INERTIA, "kg m²", "0 (no inertia) or "),
     WithJsonSchema({"anyOf": [_NUMBER, _THREE, _THREE_BY_THREE]}),
 ]

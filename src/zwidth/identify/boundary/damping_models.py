@@ -25,7 +25,8 @@ from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, suggestion
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping, modal_matrix, natural_frequencies
+from zwidth.model.mechanism import Damping, ModalDamping, ProportionalDamping
+from zwidth.model.modes import modal_matrix, natural_frequencies
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 

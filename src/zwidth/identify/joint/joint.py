@@ -8,10 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.device.address import table
+from zwidth.device.address import LegMember, members, table
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, dotted, fail, suggestion
-from zwidth.device.legs import LegMember, members
 from zwidth.errors import DeviceError
 from zwidth.identify.records.record import Columns, Record
 from zwidth.model.plant import Plant

@@ -16,9 +16,9 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from zwidth.arrays import Floats
+from zwidth.device.address import members, written
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, dotted, fail, plural, quote, suggestion
-from zwidth.device.legs import members, written
 from zwidth.identify.identification import Estimate, Identification, refused
 from zwidth.identify.records.record import Columns, Record, averaged_rows
 from zwidth.identify.stiffness.checks import StrokeRun, check_runs

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from zwidth import errors
 from zwidth.device.faults import SETTINGS, Fault
-from zwidth.errors import DeviceError, FileError, NoAnswerError, OutputError, ProcessorError, ZwidthError
 from zwidth.show.cli.progress import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import printable
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 DEBUG = "ZWIDTH_DEBUG"
 
 
-class BadInput(ZwidthError):
+class BadInput(errors.ZwidthError):
     """The command line is not valid; each line is one fault."""
 
     def __init__(self, *lines: str) -> None:
@@ -30,7 +30,7 @@ class BadInput(ZwidthError):
         super().__init__("\n".join(lines))
 
 
-class UnfinishedRun(ZwidthError):
+class UnfinishedRun(errors.ZwidthError):
     """A run that could not be finished although its input is valid; the text says why."""
 
 
@@ -41,66 +41,50 @@ def translate_errors(question: Question) -> Iterator[None]:
     Raises  NoAnswerError  where the posture does not exist, or double precision cannot decide
             BadInput  where the model, or the loop, does not fit the device
     """
-    from zwidth.errors import (
-        ArgumentError,
-        ChartError,
-        DirectionError,
-        EquilibriumError,
-        HysteresisError,
-        LoadError,
-        MissingNumbersError,
-        ModelError,
-        NonlinearError,
-        OperatorError,
-        PostureError,
-        ResponseError,
-        SidewaysForceError,
-        UnmovedError,
-    )
 
     try:
         yield
-    except ArgumentError as error:
+    except errors.ArgumentError as error:
         option = f"{as_option(error.argument)}: " if error.argument else f"{question.name}: "
         raise BadInput(*(f"{option}{reason}" for reason in error.reasons)) from None
-    except SidewaysForceError as error:
+    except errors.SidewaysForceError as error:
         raise BadInput(f"{question.name}: load: {error}") from None
-    except (PostureError, EquilibriumError) as error:
-        raise NoAnswerError(str(error)) from None
-    except LoadError as error:
+    except (errors.PostureError, errors.EquilibriumError) as error:
+        raise errors.NoAnswerError(str(error)) from None
+    except errors.LoadError as error:
         raise BadInput(f"{question.name}: load: {error}") from None
-    except MissingNumbersError as error:
-        raise NoAnswerError(f"this {error}") from None
-    except ChartError as error:
-        raise NoAnswerError(f"this is undecided: {error}", decided=False) from None
-    except DirectionError as error:
+    except errors.MissingNumbersError as error:
+        raise errors.NoAnswerError(f"this {error}") from None
+    except errors.ChartError as error:
+        raise errors.NoAnswerError(f"this is undecided: {error}", decided=False) from None
+    except errors.DirectionError as error:
         raise BadInput(f"{question.name}: direction: {error}") from None
-    except ModelError as error:
+    except errors.ModelError as error:
         model = f"model {question.model}: " if question.model else ""
         raise BadInput(f"{question.name}: {model}{error}") from None
-    except ResponseError as error:
+    except errors.ResponseError as error:
         raise BadInput(f"{question.name}: response: {error}") from None
-    except NonlinearError as error:
+    except errors.NonlinearError as error:
         raise BadInput(
             f"{question.name}: {error.estimate} is not linear, so it has no chart; use zwidth simulate or zwidth "
             "experiment, or another estimate with --set loop.velocity.method=backward-difference"
         ) from None
-    except (UnmovedError, HysteresisError, OperatorError) as error:
+    except (errors.UnmovedError, errors.HysteresisError, errors.OperatorError) as error:
         raise BadInput(f"{question.name}: {error}") from None
 
 
 def explain(error: Exception) -> tuple[list[str], int]:
     """The lines for standard error, and the exit code, of any error that a command raises."""
     match error:
-        case DeviceError():
+        case errors.DeviceError():
             return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
-        case BadInput() | FileError():
+        case BadInput() | errors.FileError():
             return [printable(line) for line in error.lines], BAD_INPUT
-        case ProcessorError():
+        case errors.ProcessorError():
             return [error.spelled(as_option)], BAD_INPUT
         case UnfinishedRun():
             return [f"zwidth: {error}"], INTERNAL
-        case OutputError():
+        case errors.OutputError():
             return [str(error)], BAD_INPUT
         case click.Abort():
             return ["zwidth: interrupted"], INTERRUPTED

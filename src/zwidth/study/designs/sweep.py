@@ -37,7 +37,7 @@ from zwidth.study.designs.study_file import read_study, study_over
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
 from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells
-from zwidth.study.jobs.store import Store, store_for
+from zwidth.study.jobs.store import Store
 from zwidth.study.workspace.plane_grid import PlaneGrid
 from zwidth.unit_text import unit_text
 
@@ -466,7 +466,7 @@ def sweep(
     return compute_designs(
         study,
         job,
-        store_for(job, store),
+        store,
         progress,
         workers,
         processor,
@@ -505,7 +505,7 @@ def run_study(
     return compute_designs(
         study,
         job,
-        store_for(job, store),
+        store,
         progress,
         workers,
         processor,
@@ -518,7 +518,7 @@ def run_study(
 def compute_designs(
     study: Study,
     job: SweepJob,
-    store: Store | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
     processor: Processor = "cpu",

@@ -8,6 +8,7 @@ that computes them: this one, others of this computer (`Processes`), or a cluste
 
 from __future__ import annotations
 
+import os
 import queue
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -22,11 +23,11 @@ import numpy as np
 
 from zwidth.argument import check_arguments
 from zwidth.arrays import Flags
-from zwidth.measures.definition import MISSING
+from zwidth.measures.definition import MISSING, merge_notes
 from zwidth.progress import Progress
 from zwidth.questions import RUN
 from zwidth.resources import Processor, check_memory, check_processor, computing_on
-from zwidth.study.jobs.job import Cells, CellValues, Job, Notes, merge_notes
+from zwidth.study.jobs.job import Cells, CellValues, Job, Notes
 from zwidth.study.jobs.workers import (
     GRACE,
     Batch,
@@ -56,7 +57,7 @@ class RecoveredWarning(UserWarning):
 
 def run_job(
     job: Job,
-    store: Store | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
     *,
@@ -75,8 +76,8 @@ def run_job(
     their values. Where all cells raise the same error, at least the first 64, the job has a fault and the error is
     raised. A process that ends is replaced, its cells are computed again, and a RecoveredWarning says so.
 
-    store       keeps the batches done; those it already holds are not computed again. Large results stay there and
-                are not read into memory
+    store       keeps the batches done, by itself or as a folder of that name; those it already holds are not
+                computed again. Large results stay there and are not read into memory
     progress    is called with `stage`, the number of cells done, and of all cells
     workers     largest number of processes; left out: one per core. 1: this process alone
     processor   "cuda": charts are computed on a GPU, by this process alone and in batches of its own
@@ -87,7 +88,8 @@ def run_job(
     executor    what computes all cells, opened before; in place of workers, time_limit and cluster
     again       whether stored cells that were out of time under a shorter limit are computed again
     Raises    TooLarge      where the cells would not fit into memory
-              StoreError    where they would not fit on the disk, or another run computes into the store
+              StoreError    where the folder holds another question's, they would not fit on the disk, or another
+                            run computes into the store
               CannotStart   where no process can be started;  WorkerLost  where every cell ends its process
               ClusterError  where the cluster cannot be used, or its scheduler ends; batches done are kept
               ValueError    for arguments that do not go together
@@ -105,6 +107,10 @@ def run_job(
     check_processor(processor)
     if store is None:
         check_cells(job.count, len(job.measures))
+    else:
+        from zwidth.study.jobs.store import store_for
+
+        store = store_for(job, store)
     with ExitStack() as stack:
         if store is not None:
             stack.enter_context(store.locked())

@@ -41,9 +41,9 @@ from zwidth._version import __version__
 from zwidth.arrays import Flags, Floats
 from zwidth.device.read import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.errors import StoreError
-from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS, Note
+from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS, Note, NoteSummary
 from zwidth.resources import check_memory
-from zwidth.study.jobs.job import CellValues, Job, Notes, NoteSummary
+from zwidth.study.jobs.job import CellValues, Job, Notes
 from zwidth.study.jobs.journal import checked_line, fingerprint, read_checked_line
 
 KIND: Final = "cells"
@@ -371,9 +371,9 @@ class StoredCells:
         )
 
 
-def store_for(job: Job, store: Store | str | os.PathLike[str] | None) -> Store | None:
-    """A job's store: the one given, or one in the folder of that name; None for None. Raises what `Store` does."""
-    return Store(Path(store), job) if isinstance(store, str | os.PathLike) else store
+def store_for(job: Job, store: Store | str | os.PathLike[str]) -> Store:
+    """A job's store: the one given, or one in the folder of that name. Raises what `Store` does."""
+    return store if isinstance(store, Store) else Store(Path(store), job)
 
 
 FILE: Final = "lock"

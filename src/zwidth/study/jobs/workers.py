@@ -34,8 +34,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.errors import CannotStart, DeviceError, MeasureError, OutOfTime, WorkerLost
-from zwidth.measures.definition import FAILED, OUT_OF_TIME, Note
-from zwidth.study.jobs.job import CellValues, merge_notes
+from zwidth.measures.definition import FAILED, OUT_OF_TIME, Note, merge_notes
+from zwidth.study.jobs.job import CellValues
 
 if TYPE_CHECKING:
     from zwidth.study.jobs.job import CellValues, Job

@@ -22,11 +22,11 @@ from zwidth.device import address
 from zwidth.device.address import UNSET, edited_text
 from zwidth.device.read import LARGEST_FILE, read_text
 from zwidth.errors import DeviceError, FileError
-from zwidth.measures.definition import Note
+from zwidth.measures.definition import Note, merge_notes
 from zwidth.progress import Progress
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
 from zwidth.study.designs.study import Study
-from zwidth.study.jobs.job import CellValues, merge_notes
+from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.series import JobSeries
 from zwidth.study.optimisation.evaluation import LARGEST, DesignJudgement, EvaluationJob, Judge

@@ -25,7 +25,7 @@ from zwidth.questions import EXPORT
 from zwidth.study.jobs.executor import run_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
-from zwidth.study.jobs.store import Store, store_for
+from zwidth.study.jobs.store import Store
 from zwidth.study.wall_tables.cell_walls import CellQuestion, cell_walls
 from zwidth.study.wall_tables.grid import Sectors, cells_of
 from zwidth.study.wall_tables.table import SafeWalls, table_of_cells, table_size
@@ -91,7 +91,7 @@ def safe_walls(
         model=model,
         seed=seed,
     )
-    return compute_table(device, job, span, store_for(job, store), progress, workers)
+    return compute_table(device, job, span, store, progress, workers)
 
 
 def safe_walls_job(
@@ -153,7 +153,7 @@ def compute_table(
     device: Device,
     job: SafeWallsJob,
     span: float | None,
-    store: Store | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
     *,

@@ -48,7 +48,7 @@ from zwidth.study.designs.column import measure_list, over_the_workspace, plane_
 from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells, CellValues
 from zwidth.study.jobs.journal import fingerprint
-from zwidth.study.jobs.store import Store, store_for
+from zwidth.study.jobs.store import Store
 from zwidth.study.workspace.extreme_direction import EXTREMES, extreme_over_directions, extreme_sign
 from zwidth.study.workspace.plane_grid import PlaneGrid, plane_of, reachable_set
 
@@ -210,10 +210,9 @@ def workspace_map(
                    what `executor.run_job` and `Store` raise
     """
     job = map_job(device, measures, plane, direction, assembly, model, wall, user_measures=user_measures)
-    kept = store_for(job, store)
     cells = run_job(
         job,
-        kept,
+        store,
         progress,
         workers,
         processor=processor,
