@@ -16,6 +16,7 @@ Values that device files may hold one day, refused until then: never ignored.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -28,7 +29,7 @@ from zwidth.device.plausibility import partly_missing
 from zwidth.device.rules.loop import COMPUTER, RESPONSE, SAMPLING
 from zwidth.device.rules.mechanism import ARM, LEGS_AS_WRITTEN, MECHANISM
 from zwidth.device.rules.plant import HAND, MOTION, PLANT, WINDINGS
-from zwidth.device.rules.rule import Document, NumberRule, Numbers, Rule, places, rule_faults
+from zwidth.device.rules.rule import Document, KeyRule, NumberRule, Numbers, Rule, places, rule_faults
 from zwidth.device.schema.device_file import KINDS, DeviceFile, flat_sources
 from zwidth.device.schema.value_types import (
     LARGEST,
@@ -73,11 +74,24 @@ AS_WRITTEN: Final[tuple[Rule, ...]] = (_sources, *LEGS_AS_WRITTEN, _partly_missi
 """Rules of a document as it is written."""
 
 
+@cache
+def _applicable(tables_there: frozenset[str]) -> tuple[Rule, ...]:
+    """Those of `RULES`, in their order, that can be broken by a document with these tables and no others."""
+
+    def about(rule: Rule) -> str:
+        """The table without which a rule has nothing to say; "" for a rule of the whole file."""
+        if isinstance(rule, KeyRule | NumberRule):
+            return rule.place.partition(".")[0]
+        return "mechanism" if rule in MECHANISM else ""
+
+    return tuple(rule for rule in RULES if about(rule) in {"", *tables_there})
+
+
 def device_faults(document: Document) -> KeyMessages:
     """Path and sentence of every disagreement between keys of a document."""
     spread, paths = spread_tables(table(document, "mechanism"))
     flat = {**document, "mechanism": spread} if spread else document
-    for path, message in rule_faults(RULES, flat):
+    for path, message in rule_faults(_applicable(frozenset(flat)), flat):
         yield written_path(path, paths), message
     yield from rule_faults(AS_WRITTEN, document)
 
