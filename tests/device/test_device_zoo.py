@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 
 import numpy as np
@@ -14,7 +13,7 @@ from zwidth.device import address, build_mechanism, bundled, bundled_names, from
 from zwidth.device.load import load
 from zwidth.device.read import read
 from zwidth.errors import DeviceError
-from zwidth.model import pack
+from zwidth.model import GivenDamping, ModalDamping, ProportionalDamping, pack
 from zwidth.model.handle_position import joint_mass_matrix
 
 
@@ -155,15 +154,14 @@ def test_an_axis_of_any_length_is_made_a_unit_vector():
 @pytest.mark.parametrize(
     ("section", "kind", "numbers"),
     [
-        ({"mode_ratio": 0.05}, "ModalDamping", (0.05,)),
-        ({"stiffness_coefficient_s": 1e-4}, "ProportionalDamping", (0.0, 1e-4)),
-        ({"given": True}, "GivenDamping", ()),
+        ({"mode_ratio": 0.05}, ModalDamping, (0.05,)),
+        ({"stiffness_coefficient_s": 1e-4}, ProportionalDamping, (0.0, 1e-4)),
+        ({"given": True}, GivenDamping, ()),
     ],
 )
 def test_ways_of_damping(section, kind, numbers):
-    damping = importlib.import_module("zwidth.model.modes")
     device = from_document(with_changes(ARM_FILE, mechanism__damping=section))
-    assert device.damping == getattr(damping, kind)(*numbers)
+    assert device.damping == kind(*numbers)
 
 
 # --- postures and directions asked for ----------------------------------------------------------------
