@@ -9,8 +9,8 @@ from zwidth.identify.impedance.local_spectra import (
     correlations,
     local_spectra,
     merged_sums,
-    neighbouring_lines,
     sums_segment_length,
+    windows_per_independent_one,
 )
 
 PERIOD = 0.001
@@ -43,7 +43,7 @@ def test_a_response_without_noise_is_fitted_although_the_device_drifts(drifting)
     assert np.max(error[20:]) < 1e-5
     inverse = spectra.fit(1, 0)[0][:, 0]
     assert np.max(np.abs(inverse * truth - 1.0)[20:]) < 1e-5
-    left = spectra.left_by(spectra.fit(0, 1)[0])
+    left = spectra.squares_left_by(spectra.fit(0, 1)[0])
     assert np.all(left[20:] < 1e-9 * spectra.values * spectra.power(1)[20:])
 
 
@@ -57,7 +57,7 @@ def test_the_error_of_a_response_of_noise_is_as_large_and_as_correlated_as_is_sa
     for apart, expected in enumerate(correlations()):
         shared = np.mean(error[: len(error) - apart] * np.conj(error[apart:])).real
         assert shared / np.mean(np.abs(error) ** 2) == pytest.approx(expected, abs=0.04)
-    assert 1.0 < neighbouring_lines() < 3.0
+    assert 1.0 < windows_per_independent_one() < 3.0
 
 
 def test_a_record_in_pieces_is_summed_as_at_once_and_none_across_a_gap(drifting):

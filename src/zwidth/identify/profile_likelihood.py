@@ -117,7 +117,7 @@ def fit_least_squares(
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
     if profiled and scale > 0.0:
         least = float(np.sum(r**2))
-        places = _distinct(minima, solved, scale**2 / thinned)
+        places = _distinct_minima(minima, solved, scale**2 / thinned)
         search = partial(_EndSearch, residuals, least=least, lower=low, upper=high, diff_step=diff_step)
         ends = _profiled_ends(search, places, quantile, scale, thinned, ends)
     ends = np.where(np.isfinite(ends), ends, np.array([[-np.inf], [np.inf]]))
@@ -178,17 +178,18 @@ def _profiled_ends(
     """
     for i in range(len(quantile)):
         rise = float(quantile[i] * scale) ** 2 / thinned
-        for place, height, own in places:
-            one = search(best=place, height=height, rise=rise, covariance=own)
-            if height - one.least < rise:
-                width = quantile[i] * np.sqrt(own[i, i])
-                both = [one.end(i, place[i] - width), one.end(i, place[i] + width)]
+        for place, height, covariance in places:
+            ends_from = search(best=place, height=height, rise=rise, covariance=covariance)
+            if height - ends_from.least < rise:  # else no end of this minimum is within
+                width = quantile[i] * np.sqrt(covariance[i, i])
+                both = [ends_from.end(i, place[i] - width), ends_from.end(i, place[i] + width)]
                 first = place is places[0][0]
+                # of the least minimum the ends; others can only widen them
                 ends[:, i] = both if first else (min(ends[0, i], both[0]), max(ends[1, i], both[1]))
     return ends
 
 
-def _distinct(
+def _distinct_minima(
     minima: Sequence[OptimizeResult], least: OptimizeResult, variance: float
 ) -> list[tuple[Floats, float, Floats]]:
     """Place (p,), sum of squares and covariance (p, p) of each minimum, the least first; one of several that are
@@ -198,7 +199,7 @@ def _distinct(
     """
     found = list[tuple[Floats, float, Floats]]()
     for one in (least, *(one for one in minima if one is not least)):
-        apart = [np.abs(one.x - place) > SAME * np.sqrt(np.diag(own)) for place, _, own in found]
+        apart = [np.abs(one.x - place) > SAME * np.sqrt(np.diag(covariance)) for place, _, covariance in found]
         if all(np.any(far) for far in apart):
             found.append((one.x, 2.0 * float(one.cost), _covariance(one.jac) * variance))
     return found
@@ -265,10 +266,10 @@ class _EndSearch:
                 outer = step
             if abs(root - 1.0) < CLOSE or (outer - inner) < CLOSE * width:
                 break
-            step = self._next(inner, outer, rises)
+            step = self._next_step(inner, outer, rises)
         return float(self.best[i] + towards * step)
 
-    def _next(self, inner: float, outer: float, rises: dict[float, float]) -> float:
+    def _next_step(self, inner: float, outer: float, rises: dict[float, float]) -> float:
         """The next step to try, as the root of the rise is nearly a straight line over the step.
 
         inner, outer  steps with too small and too large a rise, nan where none was seen;   rises  step -> root
@@ -281,7 +282,7 @@ class _EndSearch:
     def _risen(self, i: int, fixed: float, starts: Sequence[Floats]) -> tuple[float, Floats]:
         """By how much the least sum of squares with parameter i held exceeds the least of all, and its place.
 
-        starts  places of all parameters; the search begins at the better one
+        fixed   value of parameter i;   starts  places of all parameters; the search begins at the better one
         """
         others = np.arange(len(self.best)) != i
 
@@ -298,9 +299,9 @@ class _EndSearch:
         step = np.where(np.isfinite(sigma), SHORT * np.minimum(sigma, np.maximum(size, 1.0)), SHORTEST * size)
         step = np.maximum(step, (self.diff_step or 0.0) * size)
         start = min((one[others] for one in starts), key=lambda some: float(np.sum(held(some) ** 2)))
-        rest, least = _descended(held, start, step, self.lower[others], self.upper[others], ENOUGH * self.rise)
+        found, least = _descended(held, start, step, self.lower[others], self.upper[others], ENOUGH * self.rise)
         place = np.empty(len(self.best))
-        place[others], place[i] = rest, fixed
+        place[others], place[i] = found, fixed
         return least - self.least, place
 
 
@@ -315,7 +316,7 @@ def _descended(
     r = residuals(x)
     least, damping = float(np.sum(r**2)), 0.0
     for _ in range(MOST_TRIALS):
-        side = np.where(x + step <= high, step, -step)
+        side = np.where(x + step <= high, step, -step)  # away from the upper bound
         jacobian = np.column_stack(
             [(residuals(x + np.eye(len(x))[k] * side[k]) - r) / side[k] for k in range(len(x))]
         )
@@ -325,10 +326,10 @@ def _descended(
             rows = np.vstack([jacobian / size, damping * np.eye(len(x))])
             move = np.linalg.lstsq(rows, np.append(-r, np.zeros(len(x))), rcond=1e-12)[0] / size
             tried = np.clip(x + move, low, high)
-            left = residuals(tried)
-            gained = least - float(np.sum(left**2))
+            remainder = residuals(tried)
+            gained = least - float(np.sum(remainder**2))
             if gained > 0.0:
-                x, r, least, damping = tried, left, least - gained, 0.1 * damping
+                x, r, least, damping = tried, remainder, least - gained, 0.1 * damping
                 break
             damping = max(10.0 * damping, 1e-3)
         if not gained > enough:

@@ -53,15 +53,18 @@ class MotionSurvey:
     forces: Floats
 
 
-def motion_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], counts: Floats, turning: Floats) -> Check:
+def motion_check(
+    drives: Sequence[str], surveys: Sequence[MotionSurvey], encoder_steps: Floats, turning: Floats
+) -> Check:
     """Check that every joint moves by more than ten counts, and by no more than four turns.
 
-    counts   (d,) of the encoders, at the joint [rad], [m]; nan where not known: the step that the readings show
-    turning  (d,) 1 where a coordinate is an angle, 0 where it is a way
+    encoder_steps  (d,) of one count, at the joint [rad], [m]; nan where not known: the step that the readings show
+    turning        (d,) 1 where a coordinate is an angle, 0 where it is a way
+    Returns        a warning where some joints move too little; refused where all do, or angles seem no radians
     """
-    spans = np.max([np.ptp(one.coordinates, axis=0) for one in surveys], axis=0)
-    steps = np.max([_steps(one.coordinates) for one in surveys], axis=0)
-    steps = np.where(np.isfinite(counts), counts, steps)
+    spans = np.max([np.ptp(survey.coordinates, axis=0) for survey in surveys], axis=0)
+    steps = np.max([_encoder_steps(survey.coordinates) for survey in surveys], axis=0)
+    steps = np.where(np.isfinite(encoder_steps), encoder_steps, steps)
     still = [k for k in range(len(drives)) if not spans[k] > COUNTS * steps[k] or spans[k] == 0.0]
     far = [k for k in range(len(drives)) if turning[k] and spans[k] > 8.0 * np.pi]
     if far:
@@ -78,13 +81,15 @@ def motion_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], counts:
     return Check("motion", True, f"{least} (rad or m){worst}")
 
 
-def _steps(values: Floats) -> list[float]:
+def _encoder_steps(values: Floats) -> list[float]:
     """The steps (d,) of the encoders, as the readings (n, d) show them; 0 where they show none."""
     return [encoder_step([column]) for column in values.T]
 
 
 def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits: Floats) -> Check:
-    """Check that torques vary, stay within the drives' limits (d,) at the joint, and are not cut."""
+    """Check that torques vary, stay within the drives' limits (d,) at the joint, and are not cut: refused for the
+    first two, a warning for the last.
+    """
     constant, cut, beyond = list[str](), list[str](), list[str]()
     for k, name in enumerate(drives):
         forces = np.concatenate([one.forces[:, k] for one in surveys])
@@ -92,11 +97,13 @@ def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits:
         if np.ptp(forces) == 0.0:
             constant.append(name)
             continue
-        share = _clipped_share(forces)
+        clipped = _clipped_share(forces)
         if np.mean(np.abs(forces) > 1.001 * limits[k]) > OVER_LIMIT:
             beyond.append(f"{name} (to {most:.3g} of {limits[k]:.3g})")
-        elif share > CLIPPED or np.mean(np.abs(forces) > 0.9999 * limits[k]) > OVER_LIMIT:
-            cut.append(f"{name} ({100.0 * max(share, float(np.mean(np.abs(forces) > 0.9999 * limits[k]))):.2g} %)")
+        elif clipped > CLIPPED or np.mean(np.abs(forces) > 0.9999 * limits[k]) > OVER_LIMIT:
+            cut.append(
+                f"{name} ({100.0 * max(clipped, float(np.mean(np.abs(forces) > 0.9999 * limits[k]))):.2g} %)"
+            )
     if constant:
         return Check("torque", False, f"the torque of {comma_list(constant)} is constant; record what acts")
     if beyond:
@@ -115,7 +122,7 @@ def _clipped_share(forces: Floats) -> float:
     shares = list[float]()
     for extreme in (np.max(forces), np.min(forces)):
         at = np.concatenate([[0], (forces == extreme).astype(int), [0]])
-        edges = np.flatnonzero(np.diff(at))
+        edges = np.flatnonzero(np.diff(at))  # where a row at the extreme begins, and ends, by turns
         lengths = edges[1::2] - edges[::2]
         shares.append(float(np.sum(lengths[lengths >= 5]) / len(forces)))
     return sum(shares)
@@ -124,26 +131,27 @@ def _clipped_share(forces: Floats) -> float:
 def velocity_check(
     drives: Sequence[str], channels: DriveChannels, survey: MotionSurvey, rate_taps: Floats, taps: Floats
 ) -> Check | None:
-    """Check that recorded velocities are the derivatives of the positions; None where no velocity is recorded.
+    """Check that recorded velocities are the derivatives of the positions; None where no velocity is recorded,
+    or where the stretch is no longer than the kernels.
 
     rate_taps, taps  (t,) kernels, `Kernel.taps`: one that smooths and differentiates, one that only smooths
     """
-    given = [k for k, name in enumerate(channels.velocity) if name]
-    if not given:
+    recorded = [k for k, name in enumerate(channels.velocity) if name]
+    if not recorded:
         return None
-    own = np.stack([survey.rows[name] for name in channels.coordinate], axis=1)
-    if len(own) <= len(taps):
+    positions = np.stack([survey.rows[name] for name in channels.coordinate], axis=1)
+    if len(positions) <= len(taps):
         return None
-    rates = convolved(own, rate_taps)
+    rates = convolved(positions, rate_taps)
     faults = list[str]()
-    for k in given:
+    for k in recorded:
         velocity = convolved(survey.rows[channels.velocity[k]], taps)
-        alike = [_correlation(velocity, rates[:, j]) for j in range(len(drives))]
+        alike = [_correlation(velocity, rates[:, j]) for j in range(len(drives))]  # with each drive's rate
         best = int(np.argmax(np.abs(alike)))
         power = max(float(rates[:, k] @ rates[:, k]), 1e-300)
         slope = float(velocity @ rates[:, k]) / power
-        # noise of the derivative draws this slope towards 0, noise of the velocity the other one from it
-        other = float(velocity @ velocity) / power / slope if slope else 0.0
+        # noise of the derivative draws this slope towards 0, of the velocity slope_by_velocity from it
+        slope_by_velocity = float(velocity @ velocity) / power / slope if slope else 0.0
         column = channels.velocity[k]
         if best != k and abs(alike[best]) > ALIKE and abs(alike[k]) < ALIKE:
             faults.append(
@@ -155,8 +163,8 @@ def velocity_check(
             faults.append(
                 f"{column} does not follow the derivative of {channels.coordinate[k]} (correlation {alike[k]:.2f})"
             )
-        elif min(slope, other) > 1.0 + SLOPE or max(slope, other) < 1.0 - SLOPE:
-            both = np.array([slope, other])
+        elif min(slope, slope_by_velocity) > 1.0 + SLOPE or max(slope, slope_by_velocity) < 1.0 - SLOPE:
+            both = np.array([slope, slope_by_velocity])
             known = [text for ratio, text in RATIOS.items() if np.all(np.abs(both / ratio - 1.0) < SLOPE)]
             cause = f"is it {known[0]}?" if known else "is it in another unit, or do rows repeat?"
             faults.append(f"{column} is {slope:.4g} times the derivative of {channels.coordinate[k]}: {cause}")
@@ -175,7 +183,8 @@ def _correlation(one: Floats, other: Floats) -> float:
 def other_readings(
     names: Sequence[str], columns: Sequence[Floats], torques: Sequence[Floats]
 ) -> tuple[str, float, float]:
-    """Look for one torque with its sign turned, or two torques swapped, with which the fit is far better.
+    """Look for another reading of the columns, one torque with its sign turned or two torques swapped, with which
+    the fit is far better.
 
     names    (d,) of the drives
     columns  (n, d, b) of each stretch, torque per unit of each base parameter;   torques  (n, d) as recorded
@@ -191,11 +200,11 @@ def other_readings(
         """Share of the squares of torques (n, d), each drive's over its weight, that least squares leave."""
         A, b = (X / weights[:, None]).reshape(-1, X.shape[2]), (read / weights).reshape(-1)
         size = np.linalg.norm(A, axis=0)
-        A = A / np.where(size > 0.0, size, 1.0)
+        A = A / np.where(size > 0.0, size, 1.0)  # columns of unit length, for the rank's tolerance
         left = b - A @ np.linalg.lstsq(A, b, rcond=1e-9)[0]
         return float(left @ left) / max(float(b @ b), 1e-300)
 
-    now = unexplained(y, scale)
+    as_recorded = unexplained(y, scale)
     tried = list[tuple[float, str]]()
     d = len(names)
     for k in range(d if d > 1 else 0):
@@ -209,7 +218,7 @@ def other_readings(
             (unexplained(y[:, order], scale[order]), f"the torques of {names[i]} and {names[j]} are swapped")
         )
     best, text = min(tried, default=(float("inf"), ""))
-    return (text if best < BETTER * now else ""), now, best
+    return (text if best < BETTER * as_recorded else ""), as_recorded, best
 
 
 def sign_check(
@@ -293,7 +302,7 @@ def drive_channels_of(device: Device, record: Record, side: Side) -> DriveChanne
     to_drive, to_force = np.diag(1.0 / n), np.diag(n)
     if side == "joint":
         to_drive = pack(mechanism).to_drive[0]
-        to_force = np.linalg.inv(to_drive).T
+        to_force = np.linalg.inv(to_drive).T  # the drives' power is that of the joints
     return DriveChannels(coordinate, force, velocity, to_drive, to_force)
 
 
@@ -304,8 +313,8 @@ def _column(record: Record, quantity: str, words: Sequence[str], *, alone: bool,
            count, since MATLAB's have no others
     alone  the device has one drive, whose columns may be named by the quantity only
     """
-    wanted = {_plain(f"{quantity}.{word}") for word in words} | ({quantity} if alone else set())
-    present = [name for name in record.names if _plain(name) in wanted]
+    wanted = {_letters_and_figures(f"{quantity}.{word}") for word in words} | ({quantity} if alone else set())
+    present = [name for name in record.names if _letters_and_figures(name) in wanted]
     if len(present) > 1:
         raise record.fault(f"columns {' and '.join(present)} are of the same drive; keep one of them")
     if present or not needed:
@@ -317,7 +326,7 @@ def _column(record: Record, quantity: str, words: Sequence[str], *, alone: bool,
     )
 
 
-def _plain(name: str) -> str:
+def _letters_and_figures(name: str) -> str:
     """A name with _ in place of all that is no letter or figure."""
     return re.sub(r"[^0-9a-zA-Z]", "_", name)
 
@@ -346,7 +355,7 @@ def check_mechanism(device: Device) -> Mechanism:
     return replace(mechanism, flexible=())
 
 
-def samples_left_out(device: Device) -> list[str]:
+def parts_left_out(device: Device) -> list[str]:
     """Name the parts of the device's file that the inverse dynamics of the fit leave out, in words."""
     mechanism = device.mechanism
     assert mechanism is not None

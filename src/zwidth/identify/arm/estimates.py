@@ -60,30 +60,30 @@ def link_mass_estimates(
     point: OperatingPoint, masses: Iterable[EffectiveMass], base: BaseParameters, fit: Regression
 ) -> Iterator[Estimate]:
     """Effective masses at a point; their intervals are those of their logarithm, without bound where the data
-    leave a part of them open."""
-    q = quantile(fit)
+    leave a part of them open, and of no width where nothing of them was fitted."""
+    half_width = quantile(fit)
     assert point.directions is not None
     for mass in masses:
         what = mass.kind.replace("_", " ")
         way = point.directions[mass.direction]  # (3,) to move along, or (6,) with the axis to turn about behind
-        words = f"about ({_listed(way[-3:])})" if mass.turns else f"along ({_listed(way[:3])})"
+        words = f"about ({_number_list(way[-3:])})" if mass.turns else f"along ({_number_list(way[:3])})"
         unit = "kg m^2" if mass.turns else "kg"
         low, high = 0.0, inf
         if mass.gradient is None:
             low = high = mass.value
         elif np.isfinite(mass.value) and base.determines(mass.gradient):
-            share = q * fit.deviation(mass.gradient[list(base.kept)]) / mass.value
-            low, high = (mass.value * _exp(-share), mass.value * _exp(share))
+            share = half_width * fit.deviation(mass.gradient[list(base.kept)]) / mass.value
+            low, high = (mass.value * _bounded_exp(-share), mass.value * _bounded_exp(share))
         yield Estimate(f"{what} {words}", mass.value, low, high, unit)
 
 
-def _exp(power: float) -> float:
+def _bounded_exp(power: float) -> float:
     """exp(power); inf where that is too large for a number."""
     return float(np.exp(power)) if power < 700.0 else inf
 
 
-def _listed(numbers: Floats) -> str:
-    """Numbers for people, four digits each."""
+def _number_list(numbers: Floats) -> str:
+    """Numbers with four digits each and commas between them."""
     return ", ".join(f"{value:.4g}" for value in numbers)
 
 
@@ -95,13 +95,13 @@ def joint_friction_estimates(
 
     beta  (b,) base parameters
     """
-    q, deviations, drives = quantile(fit), fit.deviations, mechanism.drives
+    half_width, deviations, drives = quantile(fit), fit.deviations, mechanism.drives
     d = len(drives.names)
     first = base.parameters.friction.start
     for j in range(first, first + 3 * d):
         if j not in base.kept:
             continue
-        what, i = divmod(j - first, d)
+        what, i = divmod(j - first, d)  # 0 dry friction, 1 viscous friction, 2 offset; of the i-th drive
         row = base.kept.index(j)
         slides = mechanism.links.joint[drives.joint[i]] == PRISMATIC
         link = mechanism.links.names[drives.joint[i]]
@@ -116,24 +116,24 @@ def joint_friction_estimates(
             key = "joint_damping_Ns_per_m" if slides else "joint_damping_Nms_per_rad"
             path = f"mechanism.links.{link}.{key}"
         path = path if _addressable(device, path) else ""
-        value, width = float(beta[row]) / scale, q * float(deviations[row]) / scale
+        value, width = float(beta[row]) / scale, half_width * float(deviations[row]) / scale
         least = 0.0 if what < 2 else -inf
         yield Estimate(name, max(value, least), max(value - width, least), max(value + width, least), unit, path)
 
 
 def base_estimates(base: BaseParameters, fit: Regression, beta: Floats) -> Iterator[Estimate]:
     """Masses, first moments and inertias in the combinations that torques tell apart, values beta (b,)."""
-    q, deviations = quantile(fit), fit.deviations
+    half_width, deviations = quantile(fit), fit.deviations
     for k, j in enumerate(base.kept):
         if j < base.parameters.friction.start:
-            width = q * float(deviations[k])
+            width = half_width * float(deviations[k])
             yield Estimate(
                 base.names[k], float(beta[k]), beta[k] - width, beta[k] + width, base.parameters.units[j]
             )
 
 
 def delay_estimate(fit: Regression) -> Estimate:
-    """Time by which the torques act after their time stamps, or after the computer's delay."""
+    """Time by which the torques act after their time stamps; of commands, after the computer's delay."""
     width = quantile(fit) * fit.delay_deviation
     return Estimate("further delay of the torques", fit.delay, fit.delay - width, fit.delay + width, "s")
 
@@ -146,39 +146,41 @@ def link_settings(
 
     values  (P,) of all parameters, of links that can exist
     """
-    numbers, missing = dict[str, Any](), list[str]()
+    numbers, copies = dict[str, Any](), list[str]()
     for k, i in enumerate(parameters.bodies):
         name = mechanism.links.names[i]
         at = f"mechanism.links.{name}"
         if not _addressable(device, f"{at}.mass_kg"):
-            missing.append(name)
+            copies.append(name)
             continue
         mass, center, inertia = body_numbers(values[PARAMETERS * k : PARAMETERS * (k + 1)])
         numbers[f"{at}.mass_kg"] = _rounded(mass)
         numbers[f"{at}.center_of_mass_m"] = [_rounded(x) for x in center]
-        numbers[f"{at}.inertia_kg_m2"] = _inertia(device, at, inertia, mechanism.links.axis[i])
+        numbers[f"{at}.inertia_kg_m2"] = _inertia_as_in_file(device, at, inertia, mechanism.links.axis[i])
     for k, i in enumerate(parameters.rotors):
         path = f"mechanism.drives.{mechanism.drives.names[i]}.motor_inertia_kg_m2"
         if _addressable(device, path):
             numbers[path] = _rounded(float(values[parameters.inertial + k]))
         else:
-            missing.append(mechanism.drives.names[i])
+            copies.append(mechanism.drives.names[i])
     remarks = [
         "of the links' own numbers the data tell only the base parameters; the rest is the file's, as near as "
         "bodies that can exist allow"
     ]
-    if missing:
-        remarks.append(f"not written, being copies in the file: {', '.join(missing)}")
+    if copies:
+        remarks.append(f"not written, being copies in the file: {', '.join(copies)}")
     return numbers, remarks
 
 
-def _inertia(device: Device, at: str, inertia: Floats, axis: Floats) -> Any:
+def _inertia_as_in_file(device: Device, at: str, inertia: Floats, axis: Floats) -> Any:
     """The inertia (3, 3) in the form that the file has: one number about the joint's axis, three moments, or a
     matrix.
 
     at  path of the link;   inertia  about its centre of mass [kg m²];   axis  (3,) of its joint
     """
-    given = address.get(device.document, f"{at}.inertia_kg_m2") if _given(device, f"{at}.inertia_kg_m2") else None
+    given = (
+        address.get(device.document, f"{at}.inertia_kg_m2") if _in_file(device, f"{at}.inertia_kg_m2") else None
+    )
     if isinstance(given, int | float):
         return _rounded(float(axis @ inertia @ axis))
     products = np.abs(inertia - np.diag(np.diag(inertia)))
@@ -187,7 +189,7 @@ def _inertia(device: Device, at: str, inertia: Floats, axis: Floats) -> Any:
     return [[_rounded(x) for x in row] for row in 0.5 * (inertia + inertia.T)]
 
 
-def _given(device: Device, path: str) -> bool:
+def _in_file(device: Device, path: str) -> bool:
     """Whether the device's file has this key."""
     return address.exists(device.document, path)
 
@@ -221,7 +223,8 @@ class EffectiveMass:
     kind       "rigid_mass", "link_side_mass" or "motor_side_mass"
     direction  number of the rendered direction
     turns      whether it is an inertia about an axis [kg m²]
-    value      [kg]; nan where the parameters' mass matrix is not positive definite
+    value      [kg]; nan where the parameters' mass matrix is not positive definite; inf along a direction in which
+               the handle cannot move
     gradient   (P,) by all parameters; None: it hangs on none of them
     """
 
@@ -235,7 +238,7 @@ class EffectiveMass:
 def effective_masses(
     parameters: Parameters, point: OperatingPoint, values: Floats, known_rotors: Floats
 ) -> Iterator[EffectiveMass]:
-    """The effective masses at a point along each of its directions.
+    """The effective masses at a point: the three of `KINDS` along each of its directions.
 
     values        (P,) of all parameters, or the base ones and 0 for the others: what the base parameters determine
                   is the same
@@ -244,27 +247,27 @@ def effective_masses(
     posture = point.posture
     assert posture is not None
     assert point.directions is not None
-    whole = mass_columns(parameters, posture.angles)
+    columns = mass_columns(parameters, posture.angles)
     links = parameters.inertial
-    by_kind = {
-        "rigid_mass": (np.arange(whole.shape[2]), True),
+    used_by_kind = {  # kind -> indices of its parameters, whether the known rotors are in it
+        "rigid_mass": (np.arange(columns.shape[2]), True),
         "link_side_mass": (np.arange(links), False),
-        "motor_side_mass": (np.arange(links, whole.shape[2]), True),
+        "motor_side_mass": (np.arange(links, columns.shape[2]), True),
     }
     for number, one in enumerate(point.directions):
         along = screw(one)
         h = lever_arms(posture, along)
-        turns = not along[:3].any()
+        turns = not along[:3].any()  # a screw without a force
         for kind in KINDS:
-            used, rotors = by_kind[kind]
-            A = whole[:, :, used] @ values[used] + (np.diag(known_rotors) if rotors else 0.0)
+            used, with_rotors = used_by_kind[kind]
+            A = columns[:, :, used] @ values[used] + (np.diag(known_rotors) if with_rotors else 0.0)
             value, gradient = np.nan, np.zeros(len(values))
             if np.max(np.abs(h)) < NO_MOTION:
                 value = np.inf
             elif _positive_definite(A):
                 x = np.linalg.solve(A, h)
                 value = 1.0 / float(h @ x)
-                gradient[used] = value**2 * np.einsum("s,stp,t->p", x, whole[:, :, used], x)
+                gradient[used] = value**2 * np.einsum("s,stp,t->p", x, columns[:, :, used], x)
             fitted = kind != "motor_side_mass" or bool(parameters.rotors)
             yield EffectiveMass(kind, number, turns, value, gradient if fitted else None)
 
@@ -277,9 +280,9 @@ def mass_columns(parameters: Parameters, angles: Floats) -> Floats:
     """
     # row s of the states is a unit acceleration of drive s, at rest and without gravity: its torques are column s
     mech = parameters.mech
-    c = mech.driven
-    at = np.tile(mech.to_drive[0] @ angles[mech.joint[-c:]], (c, 1))
-    still, unit = np.zeros((c, c)), np.eye(c)
+    d = mech.driven
+    at = np.tile(mech.to_drive[0] @ angles[mech.joint[-d:]], (d, 1))  # the driven joints are the last
+    still, unit = np.zeros((d, d)), np.eye(d)
     links, _, _ = inertia_regressor(mech, angles, at, still, unit, np.zeros(3))
     columns = parameters.columns(links, still, unit, still)[:, :, : parameters.friction.start]
     return np.asarray(0.5 * (columns + np.swapaxes(columns, 0, 1)))
@@ -314,7 +317,8 @@ class ConsistentLinks:
 def consistent_links(
     base: BaseParameters, mechanism: Mechanism, beta: Floats, information: Floats
 ) -> ConsistentLinks:
-    """All parameters, of links that can exist, nearest to base parameters beta (b,) of this information (b, b).
+    """All parameters, of links that can exist, nearest to base parameters beta (b,) of this information (b, b), as
+    the module's docstring says.
 
     Links whose mass the file leaves out begin as rods of one mass per length, and that of the base parameters.
     """
@@ -324,63 +328,73 @@ def consistent_links(
     file = pseudo_inertias(mechanism, parameters.bodies)
     roots = np.asarray(np.linalg.cholesky(file), dtype=np.float64)
     rotors = np.array([_positive_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
-    whiten = _whitening(information)
-    free = np.arange(*parameters.friction.indices(len(parameters.names)))
-    own = [base.kept.index(j) if j in base.kept else -1 for j in free]
+    root = _information_root(information)
+    friction = np.arange(*parameters.friction.indices(len(parameters.names)))
+    # where each parameter of friction stands among the base parameters, -1 where it is none of them
+    friction_rows = [base.kept.index(j) if j in base.kept else -1 for j in friction]
     count = parameters.inertial + len(rotors)
-    dynamic = np.array([k for k in range(len(base.kept)) if k not in own], dtype=int)
-    kept_friction = np.array([k for k in own if k >= 0], dtype=int)
-    rest = _without_friction(whiten, dynamic, kept_friction)
+    dynamic = np.array([k for k in range(len(base.kept)) if k not in friction_rows], dtype=int)
+    kept_friction = np.array([k for k in friction_rows if k >= 0], dtype=int)
+    root_without_friction = _without_friction(root, dynamic, kept_friction)
     G = base.matrix[dynamic]
 
     def residuals(x: Floats) -> Floats:
         """What the base parameters of coordinates x (count,) miss beta by, whitened, then x over s."""
         return np.concatenate(
-            [rest @ (G @ _all_parameters(parameters, roots, rotors, x)[0] - beta[dynamic]), x / WIDE]
+            [
+                root_without_friction
+                @ (G @ _parameters_and_slopes(parameters, roots, rotors, x)[0] - beta[dynamic]),
+                x / WIDE,
+            ]
         )
 
     def slopes(x: Floats) -> Floats:
         """Derivatives of `residuals` by x."""
         return np.concatenate(
-            [rest @ (G @ _all_parameters(parameters, roots, rotors, x)[1]), np.eye(count) / WIDE]
+            [
+                root_without_friction @ (G @ _parameters_and_slopes(parameters, roots, rotors, x)[1]),
+                np.eye(count) / WIDE,
+            ]
         )
 
     solved = least_squares(
         residuals, np.zeros(count), jac=slopes, xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200
     )
-    values = _all_parameters(parameters, roots, rotors, np.asarray(solved.x))[0]
-    moved = rest @ (G @ values - beta[dynamic])
+    values = _parameters_and_slopes(parameters, roots, rotors, np.asarray(solved.x))[0]
+    moved = root_without_friction @ (G @ values - beta[dynamic])
     deviation = float(np.sqrt(np.sum(moved**2) / max(len(dynamic), 1)))
-    # friction at its best beside these links; a negative level is none
-    shift = _shift(whiten, dynamic, kept_friction, G @ values - beta[dynamic])
-    for j, k in zip(free, own, strict=True):
+    # friction at its best beside these links; a parameter that is no base parameter is 0
+    shift = _shift_with_friction(root, dynamic, kept_friction, G @ values - beta[dynamic])
+    for j, k in zip(friction, friction_rows, strict=True):
         values[j] = beta[k] + shift[k] if k >= 0 else 0.0
     return ConsistentLinks(values, deviation)
 
 
-def _whitening(information: Floats) -> Floats:
+def _information_root(information: Floats) -> Floats:
     """Give a root W (b, b) of the base parameters' information (b, b), which is W^T W."""
     size = np.sqrt(np.diag(information))
     size = 1.0 / np.where(size > 0.0, size, 1.0)
-    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
+    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)  # of a diagonal of ones
     return np.asarray((np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T) / size)
 
 
-def _without_friction(whiten: Floats, dynamic: Ints, friction: Ints) -> Floats:
+def _without_friction(root: Floats, dynamic: Ints, friction: Ints) -> Floats:
     """Give the columns (b, n) of the information's root for the base parameters that are not friction, less their
     part along the columns of friction, which is fitted freely beside them.
 
-    whiten             (b, b) root of the information
+    root               (b, b) root of the information
     dynamic, friction  indices (n,) of the base parameters that are not friction, and (k,) of those that are
     """
-    rest = whiten[:, dynamic]
+    columns = root[:, dynamic]
     if len(friction):
-        Q = np.linalg.qr(whiten[:, friction])[0]
-        rest = rest - Q @ (Q.T @ rest)
-    return rest
+        Q = np.linalg.qr(root[:, friction])[0]
+        columns = columns - Q @ (Q.T @ columns)
+    return columns
 
 
-def _all_parameters(parameters: Parameters, roots: Floats, rotors: Floats, x: Floats) -> tuple[Floats, Floats]:
+def _parameters_and_slopes(
+    parameters: Parameters, roots: Floats, rotors: Floats, x: Floats
+) -> tuple[Floats, Floats]:
     """Compute the parameters (P,) of links, friction being 0, and their derivatives (P, count) by x (count,).
 
     roots   (w, 4, 4) lower triangles of the file's pseudo-inertias
@@ -389,27 +403,27 @@ def _all_parameters(parameters: Parameters, roots: Floats, rotors: Floats, x: Fl
     """
     count = parameters.inertial + len(rotors)
     values, slopes = np.zeros(len(parameters.names)), np.zeros((len(parameters.names), count))
-    bodies, by_own = _body_parameters(roots, x[: parameters.inertial].reshape(-1, PARAMETERS))
+    bodies, body_slopes = _body_parameters(roots, x[: parameters.inertial].reshape(-1, PARAMETERS))
     values[: parameters.inertial] = bodies.ravel()
     for k in range(len(roots)):
-        own = slice(PARAMETERS * k, PARAMETERS * (k + 1))
-        slopes[own, own] = by_own[k]
+        rows = slice(PARAMETERS * k, PARAMETERS * (k + 1))
+        slopes[rows, rows] = body_slopes[k]
     turning = np.arange(parameters.inertial, count)
     values[turning] = slopes[turning, turning] = rotors * np.exp(x[turning])
     return values, slopes
 
 
-def _shift(whiten: Floats, dynamic: Ints, friction: Ints, moved: Floats) -> Floats:
+def _shift_with_friction(root: Floats, dynamic: Ints, friction: Ints, moved: Floats) -> Floats:
     """Give the change (b,) of all base parameters where those that are not friction change by `moved` (n,), and
-    friction follows so that the fit is best.
+    friction follows so that |W shift| is least, W the root of the information.
 
-    whiten             (b, b) root of the information
+    root               (b, b) root of the information
     dynamic, friction  indices (n,) of the base parameters that are not friction, and (k,) of those that are
     """
-    shift = np.zeros(len(whiten))
+    shift = np.zeros(len(root))
     shift[dynamic] = moved
     if len(friction):
-        shift[friction] = -np.linalg.lstsq(whiten[:, friction], whiten[:, dynamic] @ shift[dynamic], rcond=None)[0]
+        shift[friction] = -np.linalg.lstsq(root[:, friction], root[:, dynamic] @ shift[dynamic], rcond=None)[0]
     return shift
 
 
@@ -433,7 +447,7 @@ def pseudo_inertias(mechanism: Mechanism, bodies: tuple[int, ...]) -> Floats:
         moments = np.linalg.eigvalsh(inertia)
         if moments[1] <= 1e-9 * moments[2]:  # one number, about the joint's axis: the others are not known
             inertia = moments[2] * np.eye(3)
-        spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia  # S about the centre of mass
         widths, axes = np.linalg.eigh(0.5 * (spread + spread.T))
         least = THIN * max(float(widths[-1]), mass * (1e-2 * length) ** 2)
         spread = axes @ np.diag(np.maximum(widths, least)) @ axes.T
@@ -444,7 +458,8 @@ def pseudo_inertias(mechanism: Mechanism, bodies: tuple[int, ...]) -> Floats:
 
 
 def body_numbers(values: Floats) -> tuple[float, Floats, Floats]:
-    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m²], of a body's ten parameters."""
+    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m²], of a body's ten parameters, whose
+    inertia is about the frame's origin."""
     m, h = float(values[0]), values[1:4]
     xx, yy, zz, xy, xz, yz = values[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -463,20 +478,23 @@ def _body_parameters(roots: Floats, x: Floats) -> tuple[Floats, Floats]:
     V = np.zeros((w, 4, 4))
     V[:, range(4), range(4)] = np.exp(x[:, :4])
     V[:, UPPER[0], UPPER[1]] = x[:, 4:]
-    steps = np.zeros((w, PARAMETERS, 4, 4))
-    steps[:, range(4), range(4), range(4)] = np.exp(x[:, :4])
-    steps[:, range(4, PARAMETERS), UPPER[0], UPPER[1]] = 1.0
+    V_slopes = np.zeros((w, PARAMETERS, 4, 4))
+    V_slopes[:, range(4), range(4), range(4)] = np.exp(x[:, :4])
+    V_slopes[:, range(4, PARAMETERS), UPPER[0], UPPER[1]] = 1.0
     factor = roots @ V
-    half = (roots[:, None] @ steps) @ np.swapaxes(factor, 1, 2)[:, None]
-    slopes = _ten(half + np.swapaxes(half, 2, 3))
-    return _ten(factor @ np.swapaxes(factor, 1, 2)), np.swapaxes(slopes, 1, 2)
+    one_side = (roots[:, None] @ V_slopes) @ np.swapaxes(factor, 1, 2)[:, None]
+    slopes = _ten_parameters(one_side + np.swapaxes(one_side, 2, 3))
+    return _ten_parameters(factor @ np.swapaxes(factor, 1, 2)), np.swapaxes(slopes, 1, 2)
 
 
-def _ten(P: Floats) -> Floats:
+def _ten_parameters(P: Floats) -> Floats:
     """The ten parameters (..., 10) of pseudo-inertias P (..., 4, 4): m, h and I of the module's docstring."""
-    S, xx, yy, zz = P[..., :3, :3], P[..., 0, 0], P[..., 1, 1], P[..., 2, 2]
-    moments = P[..., 3, 3], P[..., 0, 3], P[..., 1, 3], P[..., 2, 3], yy + zz, xx + zz, xx + yy
-    return np.stack([*moments, -S[..., 0, 1], -S[..., 0, 2], -S[..., 1, 2]], axis=-1)
+    S, xx, yy, zz = P[..., :3, :3], P[..., 0, 0], P[..., 1, 1], P[..., 2, 2]  # I_xx = S_yy + S_zz, I_xy = -S_xy
+    first_moments = P[..., 0, 3], P[..., 1, 3], P[..., 2, 3]
+    return np.stack(
+        [P[..., 3, 3], *first_moments, yy + zz, xx + zz, xx + yy, -S[..., 0, 1], -S[..., 0, 2], -S[..., 1, 2]],
+        axis=-1,
+    )
 
 
 def _positive_or(value: float, otherwise: float) -> float:

@@ -42,18 +42,18 @@ SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
 
 
 def length_check(seen: Sequence[Compared], validation: Sequence[Compared], base: BaseParameters) -> Check:
-    """Check that there are enough torques to fit (seen), and enough samples to validate."""
+    """Check that there are enough torques to fit, those of `seen`, and enough samples to validate."""
     count = sum(one.torques.size for one in seen)
-    left = sum(len(one.time) for one in validation)
+    samples = sum(len(one.time) for one in validation)
     wanted = FEWEST * len(base.kept)
-    if count < wanted or left < UNSEEN:
+    if count < wanted or samples < UNSEEN:
         reason = f"{count} torques in the analysed band to fit {len(base.kept)} parameters, {wanted} are needed"
         return Check(
             "length",
             False,
-            f"{reason}, and {UNSEEN} samples to validate, of which there are {left}; record longer",
+            f"{reason}, and {UNSEEN} samples to validate, of which there are {samples}; record longer",
         )
-    return Check("length", True, f"{count} torques in the analysed band to fit, {left} samples to validate")
+    return Check("length", True, f"{count} torques in the analysed band to fit, {samples} samples to validate")
 
 
 def excitation_check(fit: Regression, base: BaseParameters, beta: Floats) -> Check:
@@ -105,25 +105,29 @@ def timing_check(fit: Regression, period: float, torque: str) -> Check:
 
 
 def gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Check | None:
-    """Check that what a fit without gravity leaves, base parameters beta (b,), does not depend on the posture as
-    gravity does; None where it does not."""
+    """Check that what a fit without gravity leaves does not depend on the posture as gravity does: a warning where
+    much of it does, else None.
+
+    seen  what was fitted, with `static` columns;   beta  (b,) base parameters
+    """
     best = np.append(beta, fit.delay)
     residual = np.concatenate([one.torques - one.columns @ best for one in seen])
     scale = np.std(residual, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
-    b = (residual / scale).reshape(-1)
-    X = (np.concatenate([one.columns for one in seen]) / scale[:, None]).reshape(len(b), -1)
-    G = (np.concatenate([one.static for one in seen]) / scale[:, None]).reshape(len(b), -1)
+    residuals = (residual / scale).reshape(-1)
+    X = (np.concatenate([one.columns for one in seen]) / scale[:, None]).reshape(len(residuals), -1)
+    G = (np.concatenate([one.static for one in seen]) / scale[:, None]).reshape(len(residuals), -1)
+    # less their part along the fitted columns, by which the fit could have taken it up
     size = np.linalg.norm(X, axis=0)
     Q = np.linalg.qr(X / np.where(size > 0.0, size, 1.0))[0]
     G = G - Q @ (Q.T @ G)
-    b = b - Q @ (Q.T @ b)
+    residuals = residuals - Q @ (Q.T @ residuals)
     if not np.any(G):
         return None
-    left, values, _ = np.linalg.svd(G, full_matrices=False)
-    left = left[:, values > 1e-6 * values[0]]
-    share = float(np.sum((left.T @ b) ** 2) / max(float(b @ b), 1e-300))
-    if share < GRAVITY or len(b) < 5 * left.shape[1]:
+    directions, singular, _ = np.linalg.svd(G, full_matrices=False)
+    directions = directions[:, singular > 1e-6 * singular[0]]
+    share = float(np.sum((directions.T @ residuals) ** 2) / max(float(residuals @ residuals), 1e-300))
+    if share < GRAVITY or len(residuals) < 5 * directions.shape[1]:
         return None
     reason = f"{100.0 * share:.3g} % of the unexplained torque depends on the posture as gravity's does"
     return Check("gravity", False, f"{reason}; state gravity, as gravity = (0, 0, -9.81)", warning=True)
@@ -145,6 +149,7 @@ def remainder_check(
         if not {*names} <= {*base.names}:
             continue
         X, torque = columns[:, i], torques[:, i]
+        # torque per unit of dry and of viscous friction: the rate's sign, and the rate
         sign, rate = (X[:, base.names.index(name)] for name in names)
         slow = np.exp(-np.abs(rate) / max(SLOW * float(np.std(rate)), 1e-300))
         further = {
@@ -153,7 +158,7 @@ def remainder_check(
             "friction that changes in time": sign * (time - np.mean(time)),
             "an offset that drifts": time - np.mean(time),
         }
-        shares = _shares_left(X, torque - X @ best, list(further.values()))
+        shares = _shares_explained(X, torque - X @ best, list(further.values()))
         most = int(np.argmax(shares))
         if shares[most] > REMAINDER:
             causes.append(f"{100.0 * shares[most]:.3g} % of that of {drive} goes with {list(further)[most]}")
@@ -164,16 +169,17 @@ def remainder_check(
     return Check("remainder", False, f"{reason}; {advice}", warning=True)
 
 
-def _shares_left(X: Floats, residual: Floats, further: Sequence[Floats]) -> Floats:
-    """Share (k,) of a residual (n,), fitted by columns X (n, p), that each of k further columns (n,) explains."""
+def _shares_explained(X: Floats, residual: Floats, further: Sequence[Floats]) -> Floats:
+    """Share (k,) of the squares of a residual (n,), of a fit by columns X (n, p), that each of k further columns
+    (n,) explains by its part across X; 0 of one that is nearly a sum of X."""
     size = np.linalg.norm(X, axis=0)
     Q = np.linalg.qr(X[:, size > 0.0] / size[size > 0.0])[0]
-    G = np.stack([column / max(float(np.linalg.norm(column)), 1e-300) for column in further], axis=1)
-    G, left = G - Q @ (Q.T @ G), residual - Q @ (Q.T @ residual)
-    squares = np.sum(G**2, axis=0)
-    seen = squares > LEAST_OTHER
-    total = max(float(left @ left), 1e-300)
-    return np.where(seen, (G.T @ left) ** 2 / np.where(seen, squares, 1.0) / total, 0.0)
+    others = np.stack([column / max(float(np.linalg.norm(column)), 1e-300) for column in further], axis=1)
+    others, unexplained = others - Q @ (Q.T @ others), residual - Q @ (Q.T @ residual)
+    squares = np.sum(others**2, axis=0)
+    told = squares > LEAST_OTHER
+    total = max(float(unexplained @ unexplained), 1e-300)
+    return np.where(told, (others.T @ unexplained) ** 2 / np.where(told, squares, 1.0) / total, 0.0)
 
 
 def consistency_check(links: ConsistentLinks) -> Check:
@@ -222,7 +228,8 @@ class Compared:
 
     record   number of the record
     time     (n,) [s]
-    columns  (n, d, b + 1)  of the base parameters, and the derivative of the torques;   torques (n, d)
+    columns  (n, d, b + 1)  torque per unit of each base parameter, and the derivative of the torques
+    torques  (n, d)
     static   (n, d, g)  further columns, of gravity along directions in which there is none; g may be 0
     """
 
@@ -260,56 +267,66 @@ class TorqueComparison:
         angles = self.first_posture(stretch)
         parameters, kept = self.base.parameters, list(self.base.kept)
         for begin in range(0, len(stretch.time), PART):
-            one = stretch.part(slice(begin, begin + PART))
-            links, places = self._links(one, angles, one.rates, one.accelerations, self.gravity)
-            all_columns = parameters.columns(links, one.rates, one.accelerations, one.signs)
+            part = stretch.part(slice(begin, begin + PART))
+            links, postures = self._link_columns(part, angles, part.rates, part.accelerations, self.gravity)
+            all_columns = parameters.columns(links, part.rates, part.accelerations, part.signs)
             columns.append(np.ascontiguousarray(all_columns[:, :, kept]))
             if static:
-                still = np.zeros_like(one.rates)
+                still = np.zeros_like(part.rates)
                 further.append(
-                    np.concatenate([self._links(one, angles, still, still, g)[0] for g in static], axis=2)
+                    np.concatenate([self._link_columns(part, angles, still, still, g)[0] for g in static], axis=2)
                 )
-            angles = places[-1]
+            angles = postures[-1]  # the next part begins near the end of this one
         torques = stretch.forces - self.known_rotors * stretch.accelerations
-        none = np.zeros((*torques.shape, 0))
-        parts = np.concatenate(columns), torques, np.concatenate(further) if static else none
+        no_columns = np.zeros((*torques.shape, 0))
+        signals = np.concatenate(columns), torques, np.concatenate(further) if static else no_columns
         narrow, step = self.band.narrow, self.band.step
         taps, half, thin = narrow.taps(step), narrow.half(step), self.band.thinning
-        made, torque, weights = (convolved(part, taps, thin) for part in parts)
+        columns_in_band, torques_in_band, gravity_columns = (convolved(signal, taps, thin) for signal in signals)
         rate = convolved(torques, narrow.taps(step, 1), thin)
         time = stretch.time[half : len(stretch.time) - half : thin]
-        return Compared(stretch.record, time, np.concatenate([made, rate[..., None]], axis=2), torque, weights)
+        return Compared(
+            stretch.record,
+            time,
+            np.concatenate([columns_in_band, rate[..., None]], axis=2),
+            torques_in_band,
+            gravity_columns,
+        )
 
-    def _links(
-        self, one: TorqueStretch, angles: Floats, rates: Floats, accelerations: Floats, gravity: Floats
+    def _link_columns(
+        self, stretch: TorqueStretch, angles: Floats, rates: Floats, accelerations: Floats, gravity: Floats
     ) -> tuple[Floats, Floats]:
-        """Torques (n, d, 10 w) per unit of each link parameter, and joint coordinates (n, joints), at a stretch's
-        coordinates.
+        """Torques (n, d, 10 w) per unit of each link parameter, and joint coordinates (n, joints), at the
+        coordinates of a stretch.
 
-        angles  joint coordinates near the first sample;   rates, accelerations  (n, d) to take;   gravity  (3,)
+        angles                joint coordinates near the first sample;   gravity  (3,)
+        rates, accelerations  (n, d) to take in place of the stretch's own
         Raises NoAnswerError  where the mechanism cannot be
         """
         mech = self.base.parameters.mech
-        links, places, reached = inertia_regressor(mech, angles, one.coordinates, rates, accelerations, gravity)
-        if reached < len(one.time):
-            raise NoAnswerError(self._no_posture_message(one, reached))
-        return links, places
+        links, postures, reached = inertia_regressor(
+            mech, angles, stretch.coordinates, rates, accelerations, gravity
+        )
+        if reached < len(stretch.time):
+            raise NoAnswerError(self._no_posture_message(stretch, reached))
+        return links, postures
 
-    def _no_posture_message(self, one: TorqueStretch, row: int) -> str:
-        """Message: at which sample the drives stand where the mechanism cannot be."""
-        numbers = ", ".join(f"{value:.4g}" for value in one.coordinates[row])
-        return f"at {one.time[row]:.6g} s the drives stand at {numbers} (rad or m), where no posture leads"
+    def _no_posture_message(self, stretch: TorqueStretch, row: int) -> str:
+        """Message: at which sample, `row` of the stretch, the drives stand where the mechanism cannot be."""
+        numbers = ", ".join(f"{value:.4g}" for value in stretch.coordinates[row])
+        return f"at {stretch.time[row]:.6g} s the drives stand at {numbers} (rad or m), where no posture leads"
 
     def first_posture(self, stretch: TorqueStretch) -> Floats:
         """Joint coordinates (n,) at the stretch's first sample. Raises NoAnswerError where no posture is there."""
         mech = self.base.parameters.mech
-        own = mech.joint[-mech.driven :]
-        step = stretch.coordinates[0] - mech.to_drive[0] @ self.start[own]
+        driven = mech.joint[-mech.driven :]
+        step = stretch.coordinates[0] - mech.to_drive[0] @ self.start[driven]
         if not mech.coupled:  # a turn more or less is the same posture
-            turns = mech.kind[own] == REVOLUTE
+            turns = mech.kind[driven] == REVOLUTE
             step = np.where(turns, step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)), step)
         moved = moved_posture(mech, self.start, step)
         if moved is None:
             raise NoAnswerError(self._no_posture_message(stretch, 0))
-        moved[own] = np.linalg.solve(mech.to_drive[0], stretch.coordinates[0])
+        # the driven joints where the record has them, turns included
+        moved[driven] = np.linalg.solve(mech.to_drive[0], stretch.coordinates[0])
         return moved

@@ -27,7 +27,7 @@ from zwidth.identify.arm.checks import (
     drive_channels_of,
     motion_check,
     other_readings,
-    samples_left_out,
+    parts_left_out,
     sign_check,
     torque_check,
     velocity_check,
@@ -199,14 +199,14 @@ class _Work:
     def identified(self) -> ArmIdentification:
         """Check the records, fit and validate; return the result, without numbers where a check fails."""
         channels = [drive_channels_of(self.device, record, self.side) for record in self.records]
-        checks, samplings = self._sampled()
+        checks, samplings = self._sampling_checks()
         if stop := self.refusal(checks):
             return stop
-        surveys = [self._survey(r, s, c) for r, s, c in zip(self.records, samplings, channels, strict=True)]
+        surveys = [self._surveyed(r, s, c) for r, s, c in zip(self.records, samplings, channels, strict=True)]
         checks += self._survey_checks(surveys)
         if stop := self.refusal(checks):
             return stop
-        band = choose_band([one.coordinates for one in surveys], samplings, self._highest())
+        band = choose_band([one.coordinates for one in surveys], samplings, self._highest_rigid_frequency())
         checks += self._band_checks(band, samplings, channels, surveys)
         if stop := self.refusal(checks):
             return stop
@@ -218,8 +218,8 @@ class _Work:
         comparison = TorqueComparison(base, band, self.gravity, self._known_rotors(), start)
         try:
             self.progress("torques", 0, 1)
-            weights = self._other_gravity()
-            seen = _compared(comparison, fitted, weights)
+            trial_gravities = self._trial_gravities()
+            seen = _compared(comparison, fitted, trial_gravities)
             validation = _compared(comparison, unseen)
         except NoAnswerError as error:
             reason = f"{error}; check the angles' signs, zeros and unit (radians), and the assembly"
@@ -229,14 +229,17 @@ class _Work:
         if stop := self.refusal(checks):
             return stop
         fit, beta = self._regressed(comparison, fitted, seen)
-        checks += self._fit_checks(fit, base, beta, seen, validation, weights, band)
+        checks += self._fit_checks(fit, base, beta, seen, validation, trial_gravities, band)
         if stop := self.refusal(checks):
             return stop
         result = self._result(checks, base, fit, beta, band, validation)
         return self.refusal(result.checks) or result
 
-    def _sampled(self) -> tuple[list[Check], list[SampleTimes]]:
-        """Check that records are sampled regularly, with one period; return the samplings not refused, too."""
+    def _sampling_checks(self) -> tuple[list[Check], list[SampleTimes]]:
+        """Check that the records are sampled regularly, with one period, and as the computer commands.
+
+        Returns  the checks, and the times of those records that are sampled regularly
+        """
         checks, samplings = list[Check](), list[SampleTimes]()
         for number, record in enumerate(self.records):
             self.progress("checking", number, len(self.records))
@@ -259,7 +262,7 @@ class _Work:
                 checks.append(Check("sampling", False, f"{reason}; correct loop.sampling_period_s, or the time"))
         return checks, samplings
 
-    def _survey(self, record: Record, sampling: SampleTimes, channels: DriveChannels) -> MotionSurvey:
+    def _surveyed(self, record: Record, sampling: SampleTimes, channels: DriveChannels) -> MotionSurvey:
         """The longest stretch among the first `SEEN` rows of a record, its end left out beyond so many."""
         best, rows = None, 0
         for piece in sampling.stretches(record):
@@ -274,12 +277,12 @@ class _Work:
     def _survey_checks(self, surveys: Sequence[MotionSurvey]) -> list[Check]:
         """Check the motion and the torques in the first rows of each record."""
         drives, links = self.mechanism.drives, self.mechanism.links
-        counts = 2.0 * np.pi / (np.asarray(drives.encoder_counts) * drives.transmission)
+        steps = 2.0 * np.pi / (np.asarray(drives.encoder_counts) * drives.transmission)  # at the joints
         turning = np.array([links.joint[joint] != PRISMATIC for joint in drives.joint], dtype=float)
         limits = drives.torque_limit * drives.transmission
-        return [motion_check(drives.names, surveys, counts, turning), torque_check(drives.names, surveys, limits)]
+        return [motion_check(drives.names, surveys, steps, turning), torque_check(drives.names, surveys, limits)]
 
-    def _highest(self) -> float:
+    def _highest_rigid_frequency(self) -> float:
         """Highest frequency at which drives may be taken for rigid [Hz]; inf where none is known to bend."""
         drives = self.mechanism.drives
         if not np.isfinite(drives.stiffness).any() or self.device.missing.get("dynamics"):
@@ -291,9 +294,10 @@ class _Work:
         """Lowest natural frequency of the links on their drives' springs, the motors held [Hz]."""
         drives, posture = self.mechanism.drives, self.point.posture
         assert posture is not None
-        spring = drives.stiffness * drives.transmission**2
+        spring = drives.stiffness * drives.transmission**2  # at the joints
         soft = np.isfinite(spring)
         compliance = np.diag(np.where(soft, 1.0 / np.where(soft, spring, 1.0), 0.0))
+        # K^-1 M has the eigenvalues 1/w^2; a drive without a spring is rigid
         largest = float(np.max(np.linalg.eigvals(compliance @ posture.mass_matrix).real))
         return 1.0 / (2.0 * np.pi * np.sqrt(largest)) if largest > 0.0 else np.inf
 
@@ -307,6 +311,7 @@ class _Work:
         """Check the stretches' lengths, recorded velocities, and what the model of rigid links leaves out."""
         checks = list[Check]()
         wide, narrow = band.wide, band.narrow
+        # both kernels take their reach off either end, the wide one twice: what is left is 1.5 times as long
         needed = 2.5 * (4.0 * wide.reach + 2.0 * narrow.reach)
         longest = max(one.longest * one.period for one in samplings)
         if longest < needed or longest / band.period < 300:
@@ -317,7 +322,7 @@ class _Work:
             check = velocity_check(self.drives, channel, survey, taps[1], taps[0])
             if check is not None:
                 checks.append(check)
-        soft = self._highest() / FLEXIBLE
+        soft = self._highest_rigid_frequency() / FLEXIBLE  # Hz, the lowest flexible mode
         if band.motion > FLEXIBLE * soft:
             reason = (
                 f"the motion reaches {band.motion:.3g} Hz, the lowest mode of the links on the drives' springs is "
@@ -325,7 +330,7 @@ class _Work:
                 f"{100.0 * (band.edge / soft) ** 2:.2g} % at most; move more slowly, or measure at the links"
             )
             checks.append(Check("flexible drives", False, reason, warning=True))
-        if left := samples_left_out(self.device):
+        if left := parts_left_out(self.device):
             checks.append(Check("device", False, f"left out: {comma_list(left)}", warning=True))
         return checks
 
@@ -355,12 +360,13 @@ class _Work:
             return np.zeros(len(drives.names))
         return np.asarray(drives.motor_inertia * drives.transmission**2)
 
-    def _other_gravity(self) -> list[Floats]:
-        """Gravities (3,) of 1 m/s² along x, y and z, which the residuals are searched for where none is given."""
+    def _trial_gravities(self) -> list[Floats]:
+        """Gravities (3,) of 1 m/s² along x, y and z, whose torques are looked for in the residuals; [] where
+        gravity was given."""
         return [] if np.any(self.gravity) else list(np.eye(3))
 
     def _refused_with(self, checks: Sequence[Check]) -> ArmIdentification:
-        """The result without numbers of checks of which one has failed."""
+        """The result without numbers, of checks of which one is known to have failed."""
         result = self.refusal(checks)
         assert result is not None
         return result
@@ -368,25 +374,32 @@ class _Work:
     def _regressed(
         self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch], seen: Sequence[Compared]
     ) -> tuple[Regression, Floats]:
-        """Fit the base parameters; return the regression, and their values (b,) without the bias of noise."""
+        """Fit the base parameters; return the regression, and their values (b,) without the bias of noise.
+
+        fitted, seen  stretches that are fitted, and their torques and columns
+        """
         base = comparison.base
         first = regress([one.columns for one in seen], [one.torques for one in seen])
-        noisy = list(self._noisy(comparison, fitted))
+        noisy = list(self._with_noise_of_both_signs(comparison, fitted))
         sources = error_sources(comparison.band, first, seen, noisy)
+        # 1 friction, 0 inertias and the delay
         groups = np.array([int(j >= base.parameters.friction.start) for j in base.kept] + [0])
         fit = regress([one.columns for one in seen], [one.torques for one in seen], sources, groups)
         return fit, _unbiased(fit, noisy)
 
-    def _noisy(self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch]) -> Iterator[list[Compared]]:
-        """The fitted stretches with as much noise again in the positions, of either sign, `PAIRS` times."""
+    def _with_noise_of_both_signs(
+        self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch]
+    ) -> Iterator[list[Compared]]:
+        """The fitted stretches with as much noise again in the positions, `PAIRS` times: with the noise added,
+        then with it taken off; fewer where a mechanism cannot follow the noise."""
         rng = np.random.default_rng(0)
         for number in range(PAIRS):
             self.progress("noise", number, PAIRS)
-            noise = [comparison.band.noise_of(len(one.time), rng) for one in fitted]
+            noise = [comparison.band.noise_of(len(stretch.time), rng) for stretch in fitted]
             for sign in (1.0, -1.0):
                 try:
                     yield _compared(
-                        comparison, [_with_noise(*one, sign) for one in zip(fitted, noise, strict=True)]
+                        comparison, [_with_noise(*pair, sign) for pair in zip(fitted, noise, strict=True)]
                     )
                 except NoAnswerError:  # at the edge of what the loops allow
                     return
@@ -398,12 +411,12 @@ class _Work:
         beta: Floats,
         seen: Sequence[Compared],
         validation: Sequence[Compared],
-        weights: Sequence[Floats],
+        trial_gravities: Sequence[Floats],
         band: TorqueBand,
     ) -> list[Check]:
         """Check the fit, base parameters beta (b,): signs, excitation, inertias, gravity, friction and timing.
 
-        seen, validation  what was fitted, and what was not;   weights  gravities (3,) that might act
+        seen, validation  what was fitted, and what was not;   trial_gravities  (3,) that might act
         """
         by_record = {one.record for one in (*seen, *validation)}
         groups = [[one for one in (*seen, *validation) if one.record == number] for number in sorted(by_record)]
@@ -411,20 +424,20 @@ class _Work:
         predicted = [np.concatenate([one.columns[..., :-1] @ beta for one in group]) for group in groups]
         labels = [self.records[number].label for number in sorted(by_record)]
         checks = [sign_check(self.drives, labels, predicted, measured) if len(groups) > 1 else None]
-        text, now, then = other_readings(
+        change, as_recorded, as_changed = other_readings(
             self.drives, [o.columns[..., :-1] for o in seen], [o.torques for o in seen]
         )
-        if text:
+        if change:
             reason = (
-                f"{100.0 * now:.3g} % of the torque is left unexplained, {100.0 * then:.3g} % would be if {text}; "
-                "noise of the positions, gravity that is not stated or another friction can look so too, and the "
-                "record does not tell which: check the columns"
+                f"{100.0 * as_recorded:.3g} % of the torque is left unexplained, {100.0 * as_changed:.3g} % would "
+                f"be if {change}; noise of the positions, gravity that is not stated or another friction can look "
+                "so too, and the record does not tell which: check the columns"
             )
             checks.append(Check("signs", False, reason))
         checks += [
             excitation_check(fit, base, beta),
             positive_check(self.drives, base, beta, self._start(), self._known_rotors()),
-            gravity_check(seen, fit, beta) if weights else None,
+            gravity_check(seen, fit, beta) if trial_gravities else None,
             remainder_check(self.drives, seen, base, np.append(beta, fit.delay)),
             timing_check(fit, band.period, self.torque),
         ]
@@ -454,7 +467,7 @@ class _Work:
         values[list(base.kept)] = beta
         numbers, noted = link_settings(self.device, self.mechanism, base.parameters, links.values)
         best = np.append(beta, fit.delay)
-        shares, total = _explained(validation, best)
+        shares, total = _explained_shares(validation, best)
         checks = [*checks, consistency_check(links), validation_check(self.drives, shares, band.edge)]
         estimates = [
             *link_mass_estimates(self.point, self._masses(base, values, links), base, fit),
@@ -504,11 +517,14 @@ class _Work:
         }
 
     def _masses(self, base: BaseParameters, values: Floats, links: ConsistentLinks) -> Iterator[EffectiveMass]:
-        """The effective masses: by the base parameters where these determine them, else by all of the links."""
+        """The effective masses: by the base parameters where these determine them, else by all of the links.
+
+        values  (P,) of all parameters, the base ones and 0 for the others;   links  that can exist
+        """
         known = self._known_rotors()
-        own = effective_masses(base.parameters, self.point, values, known)
-        whole = effective_masses(base.parameters, self.point, links.values, known)
-        for one, other in zip(own, whole, strict=True):
+        by_base = effective_masses(base.parameters, self.point, values, known)
+        by_links = effective_masses(base.parameters, self.point, links.values, known)
+        for one, other in zip(by_base, by_links, strict=True):
             determined = one.gradient is None or base.determines(one.gradient)
             yield one if determined and np.isfinite(one.value) else other
 
@@ -517,7 +533,7 @@ class _Work:
         time = np.concatenate([one.time for one in validation])
         measured = np.concatenate([one.torques for one in validation])
         predicted = np.concatenate([one.columns @ best for one in validation])
-        some = slice(None, None, max(len(time) // 20_000, 1))
+        some = slice(None, None, max(len(time) // 20_000, 1))  # rows that are kept
         columns: dict[str, Sequence[Any]] = {"time_s": time[some].tolist()}
         for k, name in enumerate(self.drives):
             slides = self.mechanism.links.joint[self.mechanism.drives.joint[k]] == PRISMATIC
@@ -532,11 +548,11 @@ def _split(stretches: Sequence[TorqueStretch]) -> tuple[list[TorqueStretch], lis
     last = stretches[-1].record if stretches else 0
     if stretches and stretches[0].record != last:
         return [one for one in stretches if one.record != last], [one for one in stretches if one.record == last]
-    count, seen = sum(len(one.time) for one in stretches), 0
+    count, before = sum(len(one.time) for one in stretches), 0
     fitted, unseen = list[TorqueStretch](), list[TorqueStretch]()
     for one in stretches:
-        cut = int(np.clip(FITTED * count - seen, 0, len(one.time)))
-        seen += len(one.time)
+        cut = int(np.clip(FITTED * count - before, 0, len(one.time)))
+        before += len(one.time)
         fitted += [one.part(slice(0, cut))] if cut else []
         unseen += [one.part(slice(cut, None))] if cut < len(one.time) else []
     return fitted, unseen
@@ -562,8 +578,11 @@ def _with_noise(stretch: TorqueStretch, noise: tuple[Floats, Floats, Floats], si
 
 
 def _unbiased(fit: Regression, noisy: Sequence[Sequence[Compared]]) -> Floats:
-    """The parameters (b,), moved back by as much as noise that is added to the positions moves them."""
-    whole = len(noisy) - len(noisy) % 2
+    """The parameters (b,), moved back by as much as noise that is added to the positions moves them.
+
+    noisy  pairs of `_with_noise_of_both_signs`
+    """
+    whole = len(noisy) - len(noisy) % 2  # noise of either sign equally often
     if not whole:
         return fit.values
     found = [fit.refitted([o.columns for o in one], [o.torques for o in one]) for one in noisy[:whole]]
@@ -573,22 +592,26 @@ def _unbiased(fit: Regression, noisy: Sequence[Sequence[Compared]]) -> Floats:
 def error_sources(
     band: TorqueBand, fit: Regression, seen: Sequence[Compared], noisy: Sequence[Sequence[Compared]]
 ) -> list[Floats]:
-    """Autocovariances (t, d) of what noise of the torques, and noise of the positions, makes of the residuals."""
+    """Autocovariances (t, d) at the lags 0, 1, ... of what the sources of error make of the residuals: first of
+    white noise of the torques, then of noise of the positions, each in a unit of its own.
+
+    noisy  pairs of `_with_noise_of_both_signs`
+    """
     taps, thin = band.narrow.taps(band.step), band.thinning
-    own = np.convolve(taps, taps[::-1])[len(taps) - 1 :: thin]
-    lags = min(len(own), LAGS)
-    white = np.tile(own[:lags, None], (1, seen[0].torques.shape[1]))
+    filtered = np.convolve(taps, taps[::-1])[len(taps) - 1 :: thin]  # white noise behind the kernel
+    lags = min(len(filtered), LAGS)
+    white = np.tile(filtered[:lags, None], (1, seen[0].torques.shape[1]))
     best = np.append(fit.values, 0.0)
-    moved = np.zeros_like(white)
+    by_positions = np.zeros_like(white)
     for plus, minus in zip(noisy[::2], noisy[1::2], strict=False):
         for one, other in zip(plus, minus, strict=True):
             error = 0.5 * ((one.columns - other.columns) @ best)
             for k in range(min(lags, len(error))):
-                moved[k] += np.sum(error[: len(error) - k] * error[k:], axis=0)
-    return [white, moved]
+                by_positions[k] += np.sum(error[: len(error) - k] * error[k:], axis=0)
+    return [white, by_positions]
 
 
-def _explained(validation: Sequence[Compared], best: Floats) -> tuple[list[float], float]:
+def _explained_shares(validation: Sequence[Compared], best: Floats) -> tuple[list[float], float]:
     """Share of each joint's torque that parameters and delay (b + 1,) explain, and the mean of the shares."""
     torques = np.concatenate([one.torques for one in validation])
     residuals = np.concatenate([one.torques - one.columns @ best for one in validation])

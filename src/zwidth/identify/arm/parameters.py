@@ -113,13 +113,14 @@ class Parameters:
         for k, i in enumerate(self.bodies):
             axis = np.abs(self.mech.axis[0, i])
             about = int(np.argmax(axis)) if axis.any() else 2
-            for j in range(PARAMETERS):
+            for j in range(PARAMETERS):  # as in `SYMBOLS`
+                # 1 moment about the axis, 2 products, 3 and 4 other moments, 5 first moments, 6 mass
                 rank = 6 if j == 0 else 5 if j < 4 else 1 if j == 4 + about else 2 if j > 6 else 3
                 # of the two other moments of inertia the latter adds to those kept: I_xx - I_yy
                 rank += int(j in (4, 5, 6) and rank == 3 and j == max(x for x in (4, 5, 6) if x != 4 + about))
                 keys.append((rank, -k, j))
         keys += [(7, k, 0) for k in range(len(self.rotors))]
-        keys += [(0, k, 0) for k in range(len(self.names) - len(keys))]
+        keys += [(0, k, 0) for k in range(len(self.names) - len(keys))]  # friction
         return sorted(range(len(keys)), key=keys.__getitem__)
 
 
@@ -142,7 +143,7 @@ class BaseParameters:
         return tuple(self._name(row) for row in range(len(self.kept)))
 
     def _name(self, row: int) -> str:
-        """Name of a combination, its leading parameter first."""
+        """Name of the combination in a row of `matrix`, its leading parameter first."""
         lead, others = self.kept[row], np.flatnonzero(self.matrix[row])
         text = self.parameters.names[lead]
         for j in others[others != lead]:
@@ -153,20 +154,21 @@ class BaseParameters:
 
     def determines(self, gradient: Floats) -> bool:
         """Whether a function of all parameters with this gradient (P,) depends on the base parameters alone."""
-        g = gradient[list(self.kept)]
-        left = gradient - g @ self.matrix
+        by_base = gradient[list(self.kept)]
+        left = gradient - by_base @ self.matrix
         return bool(np.max(np.abs(left), initial=0.0) <= 1e-6 * np.max(np.abs(gradient), initial=0.0))
 
 
 def base_parameters(parameters: Parameters, start: Floats, gravity: Floats) -> BaseParameters:
-    """The base parameters of a mechanism, over random states about a posture.
+    """The base parameters of a mechanism, over random states about a posture, as the module's docstring says.
 
     start    (n,) joint coordinates of the posture;   gravity  (3,) [m/s²]
     """
     W = _random_columns(parameters, start, gravity)
     size = np.sqrt(np.einsum("rp,rp->p", W, W))
     scaled = W / np.where(size > 0.0, size, 1.0)
-    kept, basis = list[int](), np.zeros((W.shape[0], 0))
+    kept, basis = list[int](), np.zeros((W.shape[0], 0))  # basis: of the columns kept, orthonormal
+    # parameters that change a torque by more than rounding
     felt = size > DEPENDENT * np.max(size[: parameters.inertial], initial=0.0) * 1e-4
     for j in parameters.order:
         left = scaled[:, j]
@@ -179,7 +181,7 @@ def base_parameters(parameters: Parameters, start: Floats, gravity: Floats) -> B
     kept.sort()
     K = np.linalg.lstsq(scaled[:, kept], scaled, rcond=None)[0]
     K[np.abs(K) < SMALL] = 0.0
-    G = K * np.where(felt, size, 0.0) / size[kept][:, None]
+    G = K * np.where(felt, size, 0.0) / size[kept][:, None]  # of columns that are not scaled
     G[:, kept] = np.eye(len(kept))
     return BaseParameters(parameters, tuple(kept), G)
 
@@ -190,19 +192,19 @@ def _random_columns(parameters: Parameters, start: Floats, gravity: Floats) -> F
     start  (n,) joint coordinates of the posture;   gravity  (3,) [m/s²]
     """
     mech, rng = parameters.mech, np.random.default_rng(0)
-    c = mech.driven
-    own = mech.joint[-c:]
-    scale = np.where(mech.kind[own] == PRISMATIC, mech.size[0], 1.0)
-    wanted, rows = 4 * len(parameters.names) // c + 8, list[Floats]()
+    d = mech.driven
+    driven = mech.joint[-d:]  # the driven joints are the last
+    scale = np.where(mech.kind[driven] == PRISMATIC, mech.size[0], 1.0)
+    wanted, rows = 4 * len(parameters.names) // d + 8, list[Floats]()
     for _ in range(TRIES * wanted):
-        step = mech.to_drive[0] @ (rng.uniform(-TURN, TURN, c) * scale)
-        rates, accelerations = rng.normal(size=(2, 1, c)) * scale
+        step = mech.to_drive[0] @ (rng.uniform(-TURN, TURN, d) * scale)
+        rates, accelerations = rng.normal(size=(2, 1, d)) * scale
         angles = moved_posture(mech, start, step)
         if angles is None:
             continue
-        at = (mech.to_drive[0] @ angles[own])[None]
-        links, _, reached = inertia_regressor(mech, angles, at, rates, 3.0 * accelerations, gravity)
-        if reached:
+        coordinates = (mech.to_drive[0] @ angles[driven])[None]
+        links, _, done = inertia_regressor(mech, angles, coordinates, rates, 3.0 * accelerations, gravity)
+        if done:
             rows.append(parameters.columns(links, rates, 3.0 * accelerations, np.sign(rates))[0])
         if len(rows) == wanted:
             break

@@ -87,7 +87,8 @@ class Regression:
         return float(np.sqrt(eigenvalues[-1] / eigenvalues[0]))
 
     def refitted(self, columns: Sequence[Floats], torques: Sequence[Floats]) -> Floats:
-        """The parameters (b,) of other columns and torques by the same filters and weights."""
+        """The parameters (b,) of other columns (n, d, b + 1) and torques (n, d), of each stretch, by the same
+        filters and weights."""
         return _solve(*_without_delay(*_sums(columns, torques, self.whitening, self.weight)))[0]
 
 
@@ -112,24 +113,33 @@ def regress(
     values = _solve(*_sums(columns, torques, whitening, weight))[0]
     for _ in range(ROUNDS):
         residuals = [y - X @ values for X, y in zip(columns, torques, strict=True)]
-        whitening = _whitening(residuals, sources)
+        whitening = _whitening_filters(residuals, sources)
         white = np.concatenate([_filtered(r, whitening) for r in residuals])
         weight = _inverse_factor(white.T @ white / max(len(white) - len(values) / d - 2.0, 1.0))
         information, moment = _sums(columns, torques, whitening, weight)
         values = _solve(information, moment)[0]
     freedom = float(max(white.size - len(values), 1))
-    spread = np.sqrt(_excess(columns, torques, values, information, whitening, weight, groups))
-    whole, delay = np.asarray(_solve(information, moment)[1]), float(values[-1])
+    wider = np.sqrt(_variance_factors(columns, torques, values, information, whitening, weight, groups))
+    with_delay, delay = np.asarray(_solve(information, moment)[1]), float(values[-1])
     information, moment = _without_delay(information, moment)
     values, covariance, unseen, size = _solve(information, moment)
-    both = np.outer(spread[:-1], spread[:-1])
-    deviation = float(spread[-1] * np.sqrt(max(whole[-1, -1], 0.0)))
+    factors = np.outer(wider[:-1], wider[:-1])
+    deviation = float(wider[-1] * np.sqrt(max(with_delay[-1, -1], 0.0)))
     return Regression(
-        values, information / both, covariance * both, unseen, size, whitening, weight, freedom, delay, deviation
+        values,
+        information / factors,
+        covariance * factors,
+        unseen,
+        size,
+        whitening,
+        weight,
+        freedom,
+        delay,
+        deviation,
     )
 
 
-def _excess(
+def _variance_factors(
     columns: Sequence[Floats],
     torques: Sequence[Floats],
     values: Floats,
@@ -145,15 +155,18 @@ def _excess(
     (the sandwich of White 1980 by blocks, known at second hand), averaged over the parameters of each group, which
     makes it steady. Counts are coarser where a joint turns round, which is where it accelerates most: inertias
     have other factors than friction.
+
+    columns, torques, groups  as in `regress`;   values, information  (b + 1,), (b + 1, b + 1) of its fit, this H
+    whitening, weight         as in `Regression`, S^-1 = weight^T weight
     """
     length = max(sum(len(y) for y in torques) // BLOCKS, 2 * whitening.shape[1])
     total, blocks = np.zeros_like(information), 0
     for X, y in zip(columns, torques, strict=True):
         if len(y) <= whitening.shape[1]:
             continue
-        both = np.concatenate([X, (y - X @ values)[..., None]], axis=2)
-        both = np.einsum("ij,njb->nib", weight, _filtered(both, whitening))
-        scores = np.einsum("nib,ni->nb", both[..., :-1], both[..., -1])
+        filtered = np.concatenate([X, (y - X @ values)[..., None]], axis=2)  # columns, then residuals
+        filtered = np.einsum("ij,njb->nib", weight, _filtered(filtered, whitening))
+        scores = np.einsum("nib,ni->nb", filtered[..., :-1], filtered[..., -1])
         for begin in range(0, len(scores), length):
             score = np.sum(scores[begin : begin + length], axis=0)
             total += np.outer(score, score)
@@ -162,16 +175,17 @@ def _excess(
     usual = np.diag(covariance)
     ratio = np.diag(covariance @ total @ covariance) / np.where(usual > 0.0, usual, 1.0)
     ratio = ratio * blocks / max(blocks - 1, 1)
-    own = np.zeros(len(values), dtype=np.int64) if groups is None else groups
+    numbers = np.zeros(len(values), dtype=np.int64) if groups is None else groups
     factors = np.ones(len(values))
-    for group in np.unique(own):
-        inside = (own == group) & (usual > 0.0)
-        factors[own == group] = max(float(np.mean(ratio[inside])), 1.0) if inside.any() else 1.0
+    for group in np.unique(numbers):
+        inside = (numbers == group) & (usual > 0.0)
+        factors[numbers == group] = max(float(np.mean(ratio[inside])), 1.0) if inside.any() else 1.0
     return factors
 
 
 def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]:
-    """The sums, (b, b) and (b,), without their last parameter, the delay, which takes its best value."""
+    """The sums of `_sums`, b + 1 parameters, for the first b: the last, the delay, takes its best value for each
+    of theirs (Schur complement)."""
     own, with_others = float(information[-1, -1]), information[:-1, -1]
     if not own > 0.0:
         return information[:-1, :-1], moment[:-1]
@@ -191,15 +205,19 @@ def _inverse_factor(covariance: Floats) -> Floats:
 def _sums(
     columns: Sequence[Floats], torques: Sequence[Floats], whitening: Floats, weight: Floats
 ) -> tuple[Floats, Floats]:
-    """The sums of X^T S^-1 X (b, b) and X^T S^-1 y (b,) over all stretches."""
+    """The sums of X^T S^-1 X (b, b) and X^T S^-1 y (b,) over all stretches, filtered.
+
+    columns, torques   (n, d, b), (n, d) of each stretch
+    whitening, weight  as in `Regression`, S^-1 = weight^T weight
+    """
     b = columns[0].shape[2]
     information, moment = np.zeros((b, b)), np.zeros(b)
     for X, y in zip(columns, torques, strict=True):
         if len(y) <= whitening.shape[1]:
             continue
-        both = _filtered(np.concatenate([X, y[..., None]], axis=2), whitening)
-        both = np.einsum("ij,njb->nib", weight, both).reshape(-1, b + 1)
-        products = both.T @ both
+        filtered = _filtered(np.concatenate([X, y[..., None]], axis=2), whitening)  # columns, then torques
+        filtered = np.einsum("ij,njb->nib", weight, filtered).reshape(-1, b + 1)
+        products = filtered.T @ filtered
         information += products[:b, :b]
         moment += products[:b, b]
     return information, moment
@@ -209,7 +227,7 @@ def _solve(information: Floats, moment: Floats) -> tuple[Floats, Floats, Floats,
     """Solve normal equations (b, b), (b,); return `values`, `covariance`, `unseen` and `size` of `Regression`."""
     length = np.sqrt(np.diag(information))
     size = 1.0 / np.where(length > 0.0, length, 1.0)
-    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
+    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)  # of columns of unit length
     seen = eigenvalues > UNSEEN * max(float(eigenvalues[-1]), 1e-300)
     half = vectors[:, seen] / np.sqrt(eigenvalues[seen])
     covariance = np.asarray((half @ half.T) * size[:, None] * size)
@@ -217,7 +235,8 @@ def _solve(information: Floats, moment: Floats) -> tuple[Floats, Floats, Floats,
 
 
 def _filtered(signals: Floats, whitening: Floats) -> Floats:
-    """Signals (n, d, ...) through each joint's filter, without the first t - 1 samples; filters (d, t)."""
+    """Signals (n, d, ...) through each joint's filter, `whitening` (d, t); without the first t - 1 samples, for
+    which the filter has no past."""
     order = whitening.shape[1] - 1
     n = len(signals) - order
     if n <= 0:
@@ -229,7 +248,7 @@ def _filtered(signals: Floats, whitening: Floats) -> Floats:
     return out
 
 
-def _whitening(residuals: Sequence[Floats], sources: Sequence[Floats]) -> Floats:
+def _whitening_filters(residuals: Sequence[Floats], sources: Sequence[Floats]) -> Floats:
     """Filters (d, t) that leave white noise of each joint's residuals, (n, d) of each stretch.
 
     sources  as in `regress`
@@ -245,22 +264,24 @@ def _whitening(residuals: Sequence[Floats], sources: Sequence[Floats]) -> Floats
         if not len(shapes):
             filters.append(np.ones(1))
             continue
-        shapes = shapes / shapes[:, :1]
-        levels = _levels([r[:, j] for r in residuals], shapes)
+        shapes = shapes / shapes[:, :1]  # each source of variance 1
+        levels = _source_levels([r[:, j] for r in residuals], shapes)
         filters.append(_levinson(levels @ shapes, 0))
-    first = _alike(filters)
-    second = _autoregressions([_filtered(r, first) for r in residuals])
-    return _alike([np.convolve(a, b) for a, b in zip(first, second, strict=True)])
+    by_sources = _padded(filters)
+    by_residuals = _autoregressions([_filtered(r, by_sources) for r in residuals])
+    return _padded([np.convolve(a, b) for a, b in zip(by_sources, by_residuals, strict=True)])
 
 
-def _alike(filters: Sequence[Floats]) -> Floats:
+def _padded(filters: Sequence[Floats]) -> Floats:
     """Filters of several lengths as the rows of a matrix, the shorter ones with zeros behind."""
     longest = max(len(one) for one in filters)
     return np.stack([np.pad(one, (0, longest - len(one))) for one in filters])
 
 
-def _levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
-    """Levels (s,) of sources with autocovariances (s, t) that make residuals, stretch by stretch, likeliest.
+def _source_levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
+    """Levels (s,) of sources that make residuals, (n,) of each stretch, likeliest.
+
+    shapes  (s, t) autocovariances r_k of each source at level 1
 
     The periodogram I of n samples is, in the mean, sum_k r_k (1 - k/n) cos(w k), and spread as much as it is
     large: levels minimise sum ((I - S)/S)^2 over and over, S that of the levels before (Whittle 1953, known at
@@ -268,15 +289,15 @@ def _levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
     """
     from scipy.optimize import nnls
 
-    power, made = list[Floats](), list[Floats]()
+    power, per_level = list[Floats](), list[Floats]()
     lags = np.arange(shapes.shape[1])
     for r in residuals:
         n = len(r)
         power.append((np.abs(np.fft.rfft(r)) ** 2 / n)[1 : (n + 1) // 2])
         angle = 2.0 * np.pi * np.arange(1, (n + 1) // 2)[:, None] / n * lags
         weights = np.where(lags > 0, 2.0, 1.0) * np.maximum(1.0 - lags / n, 0.0)
-        made.append((weights * np.cos(angle)) @ shapes.T)
-    I, A = np.concatenate(power), np.maximum(np.concatenate(made), 0.0)
+        per_level.append((weights * np.cos(angle)) @ shapes.T)
+    I, A = np.concatenate(power), np.maximum(np.concatenate(per_level), 0.0)  # S = A levels
     scale = float(np.mean(I)) or 1.0
     S = A @ np.full(len(shapes), scale)
     levels = np.full(len(shapes), scale)
@@ -301,12 +322,16 @@ def _autoregressions(residuals: Sequence[Floats]) -> Floats:
     for r in residuals:
         for k in range(most + 1):
             lagged[k] += np.einsum("nd,nd->d", r[: len(r) - k], r[k:])
-    return _alike([_levinson(row / count, count) for row in lagged.T])
+    return _padded([_levinson(row / count, count) for row in lagged.T])
 
 
 def _levinson(correlation: Floats, count: int) -> Floats:
-    """The filter of least order by Schwarz's criterion, from correlations at the lags 0, 1, ... of so many
-    samples; of known correlations, count 0, that of the highest order."""
+    """The filter, its first coefficient 1, that leaves white noise of a signal, by Levinson's recursion; of the
+    order by Schwarz's criterion.
+
+    correlation  (t,) at the lags 0, 1, ...
+    count        samples that it was estimated from; 0: it is known, and the filter is of the highest order
+    """
     a, best = np.ones(1), np.ones(1)
     error = correlation[0] * (1.0 + FLOOR)
     if not error > 0.0:

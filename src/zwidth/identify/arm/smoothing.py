@@ -67,40 +67,43 @@ class Kernel:
         """
         half = self.half(period)
         t = np.arange(-half, half + 1) * period - shift
-        x, s2 = 2.0 * np.pi * self.edge, self.width**2
-        g: Floats = np.exp(-0.5 * t**2 / s2)
-        # sin(x t)/t and its derivatives, by their series about 0
-        near = np.abs(x * t) < 1e-2
-        u = np.where(near, 1.0, t)
-        sine, cosine = np.sin(x * t), np.cos(x * t)
-        y = x * t
-        k0 = np.where(near, x * (1.0 - y**2 / 6.0 + y**4 / 120.0), sine / u)
-        k1 = np.where(near, x**2 * (-y / 3.0 + y**3 / 30.0), (x * cosine - sine / u) / u)
-        k2 = np.where(
+        w, s2 = 2.0 * np.pi * self.edge, self.width**2
+        gauss: Floats = np.exp(-0.5 * t**2 / s2)
+        # sin(w t)/t and its first and second derivative, by their series about 0
+        near = np.abs(w * t) < 1e-2
+        t_or_1 = np.where(near, 1.0, t)
+        sine, cosine = np.sin(w * t), np.cos(w * t)
+        wt = w * t
+        sinc = np.where(near, w * (1.0 - wt**2 / 6.0 + wt**4 / 120.0), sine / t_or_1)
+        sinc_1 = np.where(near, w**2 * (-wt / 3.0 + wt**3 / 30.0), (w * cosine - sine / t_or_1) / t_or_1)
+        sinc_2 = np.where(
             near,
-            x**3 * (-1.0 / 3.0 + y**2 / 10.0),
-            (-(x**2) * sine - 2.0 * x * cosine / u + 2.0 * sine / u**2) / u,
+            w**3 * (-1.0 / 3.0 + wt**2 / 10.0),
+            (-(w**2) * sine - 2.0 * w * cosine / t_or_1 + 2.0 * sine / t_or_1**2) / t_or_1,
         )
-        first = -t / s2
-        second = t**2 / s2**2 - 1.0 / s2
-        h = (k0, k1 + k0 * first, k2 + 2.0 * k1 * first + k0 * second)[derivative]
+        # derivatives of the Gaussian over itself; then those of the product
+        gauss_1 = -t / s2
+        gauss_2 = t**2 / s2**2 - 1.0 / s2
+        h = (sinc, sinc_1 + sinc * gauss_1, sinc_2 + 2.0 * sinc_1 * gauss_1 + sinc * gauss_2)[derivative]
         return _exact_for_powers(
-            np.asarray(h * g * period / np.pi), g, np.asarray(t, dtype=np.float64), derivative
+            np.asarray(h * gauss * period / np.pi), gauss, np.asarray(t, dtype=np.float64), derivative
         )
 
 
-def _exact_for_powers(taps: Floats, g: Floats, t: Floats, derivative: int) -> Floats:
+def _exact_for_powers(taps: Floats, gauss: Floats, t: Floats, derivative: int) -> Floats:
     """Taps that differentiate 1, t and t^2 without error, which ends and rounding would leave on them: a joint
     that stands at 1 rad would seem to accelerate by 1e-3 rad/s².
 
-    taps, g, t  (2 half + 1,) kernel's samples, its Gaussian factor, and their times [s];   derivative  0, 1 or 2
+    taps, gauss, t  (2 half + 1,) kernel's samples, its Gaussian factor, and their times [s]
+    derivative      0, 1 or 2
     """
+    # sums of taps times t^power: a convolution turns the time round, so that h' has -1 for t; and t^2'' is 2
     powers = ((0,), (1,), (0, 2))[derivative]
     wanted = ((1.0,), (-1.0,), (0.0, 2.0))[derivative]
-    bumps = np.stack([g * t**power for power in powers])
+    corrections = np.stack([gauss * t**power for power in powers])
     moments = np.stack([t**power for power in powers])
-    shares = np.linalg.solve(bumps @ moments.T, np.array(wanted) - moments @ taps)
-    return np.asarray(taps + shares @ bumps)
+    shares = np.linalg.solve(corrections @ moments.T, np.array(wanted) - moments @ taps)
+    return np.asarray(taps + shares @ corrections)
 
 
 @dataclass(frozen=True)
@@ -154,14 +157,14 @@ class TorqueBand:
     def noise_of(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
         """Draw noise of the positions' floor, smoothed: positions, velocities, accelerations (count, d)."""
         kernel, half = self.wide, self.wide.half(self.step)
-        size = np.sqrt(self.noise / (2.0 * self.step))
+        size = np.sqrt(self.noise / (2.0 * self.step))  # of white noise with this one-sided density
         white = rng.normal(size=(count + 2 * half, len(size))) * size
-        first, second, third = (convolved(white, kernel.taps(self.step, k)) for k in range(3))
-        return first, second, third
+        positions, velocities, accelerations = (convolved(white, kernel.taps(self.step, k)) for k in range(3))
+        return positions, velocities, accelerations
 
 
 def convolved(signals: Floats, taps: Floats, down: int = 1) -> Floats:
-    """Signals (n, ...) convolved with taps (t,) where they overlap in full; every `down`-th sample."""
+    """Signals (n, ...) convolved with taps (t,) where they overlap in full, n - t + 1 samples; every `down`-th."""
     from scipy.signal import oaconvolve
 
     columns = signals.reshape(len(signals), int(np.prod(signals.shape[1:])))
@@ -179,20 +182,21 @@ def choose_band(
     """The band in which records of one period are analysed.
 
     positions  (n, d) of each record, its longest stretch or the beginning of that
-    highest    that the model may be used to [Hz]
+    highest    frequency that the model may be used to [Hz]
     """
     period = sampling[0].period
     spectra = [_spectrum(one, period) for one in positions]
     edge, noise = 0.0, np.zeros(positions[0].shape[1])
     for frequency, density in spectra:
-        floor = np.array([_floor(frequency, row) for row in density.T])
-        noise = np.maximum(noise, floor)
-        for row, level in zip(density.T, floor, strict=True):
+        floors = np.array([_floor(frequency, row) for row in density.T])
+        noise = np.maximum(noise, floors)
+        for row, level in zip(density.T, floors, strict=True):
             above = np.flatnonzero(row > ABOVE * max(level, 1e-13 * float(np.max(row))))
             edge = max(edge, float(frequency[above[-1]]) if len(above) else 0.0)
     longest = max(one.longest for one in sampling) * period
     length = sum(one.rows for one in sampling) * period
     lowest = SHORTEST / longest
+    # the record's sampling, and a length that can be worked on, bound the band from above
     most = min(1.0 / (SAMPLES * 1.5 * WIDE * period), LONGEST / (SAMPLES * 1.5 * WIDE * length), highest)
     analysed = min(max(edge, lowest), most)
     stride = max(int(1.0 / (SAMPLES * 1.5 * WIDE * analysed * period)), 1)
@@ -213,7 +217,8 @@ def _spectrum(positions: Floats, period: float) -> tuple[Floats, Floats]:
 
 
 def _floor(frequency: Floats, density: Floats) -> float:
-    """Level of the noise in a density (f,): the least median over parts of the upper half of the spectrum."""
+    """Level of the noise in a density (f,) at frequencies (f,): the least median over parts of the upper half of
+    the spectrum."""
     top = float(frequency[-1])
     edges = np.linspace(0.5, 0.95, 5) * top
     inside = [density[(frequency >= a) & (frequency < b)] for a, b in pairwise(edges)]

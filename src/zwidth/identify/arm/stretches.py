@@ -68,7 +68,7 @@ def smoothed(
 
     number  of the record among all;   channels  its columns;   timing  when its torques act
     """
-    check_memory(
+    check_memory(  # of each drive five signals, and their time
         6.0 * len(channels.force) * sampling.rows / band.stride,
         f"the smoothed samples of {record.label}",
         "give a shorter record",
@@ -97,21 +97,27 @@ def _tables(record: Record, sampling: SampleTimes, channels: DriveChannels) -> I
 
 
 def _windows(tables: Iterator[Table], reach: int, stride: int) -> Iterator[Table]:
-    """Each stretch in tables that overlap: every `stride`th row from row `reach` on, as far as as many rows stand
-    behind it; these rows follow each other from table to table."""
-    rest, begins = np.zeros((0, 0)), True
+    """Cut stretches into windows, so that a kernel applied to each gives every row of the stretch once.
+
+    Kept are every `stride`th row from row `reach` on that has `reach` rows before and behind it: a window holds
+    its kept rows with `reach` rows on either side, and the next window's first kept row is one stride behind its
+    last.
+    Yields  whether a window is the first of its stretch, and its rows
+    """
+    remainder, begins = np.zeros((0, 0)), True
     for starts, table in tables:
-        own = table if starts else np.concatenate([rest, table])
+        rows = table if starts else np.concatenate([remainder, table])
         begins = begins or starts
-        count = (len(own) - 2 * reach - 1) // stride + 1
+        count = (len(rows) - 2 * reach - 1) // stride + 1
         if count > 0:
-            yield begins, own[: 2 * reach + (count - 1) * stride + 1]
+            yield begins, rows[: 2 * reach + (count - 1) * stride + 1]
             begins = False
-        rest = own[max(count, 0) * stride :].copy()
+        remainder = rows[max(count, 0) * stride :].copy()
 
 
 def _guarded(tables: Iterator[Table], band: TorqueBand) -> Iterator[Table]:
-    """Tables thinned to one row of `coarse`, by a short kernel that takes nothing from the positions' band."""
+    """Tables thinned to one row of `band.coarse`, by the low pass `band.guard`, which takes nothing from the
+    positions' band."""
     from scipy.signal import upfirdn
 
     half, down = band.guard.half(band.period), band.coarse
@@ -133,30 +139,35 @@ def _joined(parts: Sequence[TorqueStretch]) -> TorqueStretch:
 
 
 def _smooth(table: Floats, number: int, band: TorqueBand, period: float, timing: TorqueTiming) -> TorqueStretch:
-    """The smoothed samples of a table that reaches two kernels' halves beyond them.
+    """The smoothed samples of a table, `Table` without its flag, that reaches twice half a kernel beyond them:
+    rates are smoothed once as derivatives, and once more as signs.
 
     number  of the record;   period  of the table [s]
     """
     kernel, down, d = band.wide, band.stride // band.coarse, table.shape[1] // 2
     half = kernel.half(period)
-    near, middle = slice(half, len(table) - half), slice(2 * half, len(table) - 2 * half, down)
-    q, force = table[:, 1 : 1 + d], table[near, 1 + d :]
+    within_half, within_both = slice(half, len(table) - half), slice(2 * half, len(table) - 2 * half, down)
+    q, force = table[:, 1 : 1 + d], table[within_half, 1 + d :]
     taps = [kernel.taps(period, k) for k in range(3)]
-    late = kernel.taps(period, 0, timing.shift) + timing.spread * kernel.taps(period, 2, timing.shift)
+    # delayed by the shift, and spread in time by a second derivative
+    force_taps = kernel.taps(period, 0, timing.shift) + timing.spread * kernel.taps(period, 2, timing.shift)
     rates = convolved(q, taps[1])
     return TorqueStretch(
         number,
-        table[middle, 0],
-        convolved(q[near], taps[0], down),
+        table[within_both, 0],
+        convolved(q[within_half], taps[0], down),
         rates[half : len(rates) - half : down],
-        convolved(q[near], taps[2], down),
+        convolved(q[within_half], taps[2], down),
         convolved(_signs(rates, band, period), taps[0], down),
-        convolved(force, late, down),
+        convolved(force, force_taps, down),
     )
 
 
 def _signs(rates: Floats, band: TorqueBand, period: float) -> Floats:
-    """Signs (n, d) of rates, going through 0 in a straight line within two deviations of their noise."""
+    """Signs (n, d) of rates, going through 0 in a straight line within two deviations of their noise.
+
+    period  of the rates [s]
+    """
     taps = band.wide.taps(period, 1)
     size = np.sqrt(band.noise / (2.0 * period) * float(taps @ taps))
     return np.clip(rates / np.maximum(2.0 * size, 1e-300), -1.0, 1.0)

@@ -16,7 +16,7 @@ from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.faults import comma_list, plural
 from zwidth.errors import DeviceError
-from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likelihood, search_ranges
+from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likelihood, measured_ranges
 from zwidth.identify.boundary.model import BoundaryModel, Scatter
 from zwidth.identify.boundary.parameters import BoundaryParameters
 from zwidth.identify.boundary.points import EDGE, LOWER, STABLE, TIP, UNSTABLE, UPPER, BoundaryPoints
@@ -33,7 +33,7 @@ UNITS: Final = {"bias_force_N": " N", "perturbation_N": " N", "watch_time_s": " 
 
 
 def complete_points(points: BoundaryPoints, records: Sequence[Record]) -> tuple[BoundaryPoints, list[Check]]:
-    """The points that have a stiffness and a damping, each once, and the checks of it."""
+    """The points that have a stiffness and a damping, each once, and warnings of those left out."""
     whole = np.isfinite(points.stiffness) & np.isfinite(points.damping)
     checks = list[Check]()
     if not whole.all():
@@ -42,7 +42,7 @@ def complete_points(points: BoundaryPoints, records: Sequence[Record]) -> tuple[
         text = f"{plural(len(rows), 'row')} without a stiffness or a damping left out: {listed}"
         checks.append(Check("rows", False, text, warning=True))
     kept = points[whole]
-    copies = _copies(kept)
+    copies = _repeats_earlier(kept)
     if copies.any():
         rows = [records[kept.record[i]].place(int(kept.row[i])) for i in np.flatnonzero(copies)]
         text = (
@@ -53,16 +53,19 @@ def complete_points(points: BoundaryPoints, records: Sequence[Record]) -> tuple[
     return kept[~copies], checks
 
 
-def _copies(points: BoundaryPoints) -> Flags:
+def _repeats_earlier(points: BoundaryPoints) -> Flags:
     """Which points (n,) are an earlier one again, in all numbers and words."""
-    seen, again = set[tuple[object, ...]](), np.zeros(len(points), dtype=bool)
+    seen, repeats = set[tuple[object, ...]](), np.zeros(len(points), dtype=bool)
     for i in range(len(points)):
         numbers = (points.stiffness, points.damping, points.frequency, points.low, points.high, points.trials)
-        own = (*(float(one[i]) for one in numbers), *(str(v[i]) for v in points.circumstances.values()))
-        key = (str(points.kind[i]), *(None if x != x else x for x in own))
-        again[i] = key in seen
+        numbers_and_words = (
+            *(float(one[i]) for one in numbers),
+            *(str(v[i]) for v in points.circumstances.values()),
+        )
+        key = (str(points.kind[i]), *(None if x != x else x for x in numbers_and_words))
+        repeats[i] = key in seen
         seen.add(key)
-    return again
+    return repeats
 
 
 def check_points(points: BoundaryPoints, count: int) -> list[Check]:
@@ -102,9 +105,10 @@ def check_magnitudes(points: BoundaryPoints, edge: EdgeChords) -> Check:
     edges = points[points.on_edge]
     if not len(edge):
         return Check("units", True, "the device as the file has it renders no stable wall to compare with")
-    _, K, _, B = edge.box
+    _, K, _, B = edge.box  # the largest of the edge
     sizes = [float(np.max(np.abs(values))) for values in (edges.stiffness, edges.damping)]
     own = [max(abs(K), 1e-300), max(abs(B), 1e-300)]
+    # powers of ten between points and chart, as the columns are named, and if they are swapped
     off = [float(np.log10(max(size, 1e-300) / one)) for size, one in zip(sizes, own, strict=True)]
     swapped = [float(np.log10(max(size, 1e-300) / one)) for size, one in zip(sizes, own[::-1], strict=True)]
     seen = (
@@ -130,7 +134,7 @@ def check_circumstances(points: BoundaryPoints, simulated: bool) -> list[Check]:
     """
     checks = list[Check]()
     circumstances = points.circumstances | {"amplitude_m": points.visible}
-    circumstances.pop("beyond", None)
+    circumstances.pop("beyond", None)  # what happened beyond the edge is no circumstance
     for name, values in circumstances.items():
         if values.dtype.kind == "U":
             kinds = sorted({str(value) for value in values if value})
@@ -218,14 +222,19 @@ WRONG: Final = 3.0  # standard deviations on the wrong side of the edge, from wh
 
 def explained_share_of_points(values: Floats, kinds: NDArray[np.str_], deviations: Floats, units: Floats) -> float:
     """Share of the points' spread that is explained: 1 - sum (deviation / unit)^2 / sum (value - mean)^2 / unit^2,
-    the mean over the points of a kind; nan where they have no spread."""
+    the mean over the points of a kind; nan where they have no spread.
+
+    values, kinds      (n,) of the points: what was bisected, and `BoundaryPoints.kind`
+    deviations, units  (n,) from the fitted edge, and what they are measured in, such as the scatter
+    """
     own = [((values - values[kinds == kind].mean()) / units)[kinds == kind] for kind in np.unique(kinds)]
     spread = sum(float(np.sum(one**2)) for one in own)
     return 1.0 - float(np.sum((deviations / units) ** 2)) / spread if spread > 0.0 else float("nan")
 
 
 def share_of_points(points: BoundaryPoints, fit_deviations: Floats, scatter: Scatter) -> float:
-    """`explained_share_of_points` of what was bisected of those on the boundary; of unknown edges the damping.
+    """`explained_share_of_points` of the points on the boundary, by what was bisected; by the damping where the
+    edge is not known.
 
     fit_deviations  (n,) `Deviations.value`
     """
@@ -248,29 +257,29 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
     edges = points[points.on_edge]
     units = model.units(fit.scatter)
     share = share_of_points(points, deviations.value, fit.scatter)
-    reach = search_ranges(points)
-    most = np.where(edges.kind == TIP, np.max(edges.stiffness), np.max(np.abs(edges.damping)))
-    sizes = np.where(edges.kind == EDGE, deviations.value * fit.scatter.damping, deviations.value)
-    remains = float(np.sqrt(np.mean((sizes / np.maximum(most, 1e-300)) ** 2)))
-    signs, chance = list[str](), 1.0 if remains < EXACT else _chance(edges, deviations.value / units)
+    reach = measured_ranges(points)
+    largest = np.where(edges.kind == TIP, np.max(edges.stiffness), np.max(np.abs(edges.damping)))
+    sizes = np.where(edges.kind == EDGE, deviations.value * fit.scatter.damping, deviations.value)  # N/m, N s/m
+    remains = float(np.sqrt(np.mean((sizes / np.maximum(largest, 1e-300)) ** 2)))
+    faults, chance = list[str](), 1.0 if remains < EXACT else _chance_of_pattern(edges, deviations.value / units)
     if chance < SYSTEMATIC:
-        signs.append("what remains follows a pattern along the edges instead of scattering")
-    if (repeated := _repeated(edges, deviations.value / units)) is not None and repeated < SYSTEMATIC:
+        faults.append("what remains follows a pattern along the edges instead of scattering")
+    if (repeated := _chance_of_repeats(edges, deviations.value / units)) is not None and repeated < SYSTEMATIC:
         chance = min(chance, repeated)
-        signs.append("what remains is larger than repeated points scatter")
+        faults.append("what remains is larger than repeated points scatter")
     lost = int(np.sum(deviations.missing))
     if lost:
-        signs.append(f"{lost} of {len(edges)} points lie beyond any stable wall")
+        faults.append(f"{lost} of {len(edges)} points lie beyond any stable wall")
     depths = model.depths(fit.vector, fit.scatter)
     wrong = int(np.sum(depths < -WRONG))
     if wrong:
-        signs.append(f"{wrong} of {len(depths)} tried walls lie on the wrong side of the edge")
+        faults.append(f"{wrong} of {len(depths)} tried walls lie on the wrong side of the edge")
     seen = (
         f"{100.0 * share:.3g} % of the spread is explained; {fit.scatter.damping:.3g} N s/m "
         f"({100.0 * fit.scatter.damping / reach.damping:.2g} % of the measured range) remain along damping"
     )
-    if signs:
-        seen += f"; {comma_list(signs)}"
+    if faults:
+        seen += f"; {comma_list(faults)}"
     gross = remains > GROSS and (share < HALF or (chance < SYSTEMATIC and share < MOST))
     if gross or lost > LOST * len(edges) or wrong > max(LOST * len(depths), 1.0):
         text = (
@@ -284,9 +293,11 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
     return Check("explained", True, seen)
 
 
-def _chance(edges: BoundaryPoints, normalised: Floats) -> float:
-    """Probability that scatter is as smooth along the edges as what remains, normalised (n,) by its deviation; 1
-    where there are too few points.
+def _chance_of_pattern(edges: BoundaryPoints, normalised: Floats) -> float:
+    """Probability that scatter alone is as smooth along the edges, or as far off on a whole edge, as what remains;
+    1 where there are too few points.
+
+    normalised  (n,) deviations of the points over their scatter
 
     Compared is the sum of the squared steps between neighbours on an edge (von Neumann's ratio), over random
     orders of the points of each edge. The orders are the same in every run.
@@ -301,37 +312,41 @@ def _chance(edges: BoundaryPoints, normalised: Floats) -> float:
     for kind in np.unique(kinds):
         shuffled[:, kinds == kind] = random.permuted(shuffled[:, kinds == kind], axis=1)
     steps = np.sum(np.where(same, np.diff(shuffled, axis=1), 0.0) ** 2, axis=1)
-    own = float(np.sum(np.where(same, np.diff(r), 0.0) ** 2))
+    own_steps = float(np.sum(np.where(same, np.diff(r), 0.0) ** 2))
     # an offset of a whole edge is a pattern, too, and no order shows it
-    offsets = [_offset(r[kinds == kind]) for kind in np.unique(kinds)]
-    smooth = (1.0 + float(np.sum(steps <= own * (1.0 + 1e-12)))) / (1.0 + PERMUTATIONS)
-    return min(smooth, *[one * len(offsets) for one in offsets])
+    offsets = [_chance_of_mean(r[kinds == kind]) for kind in np.unique(kinds)]
+    smooth = (1.0 + float(np.sum(steps <= own_steps * (1.0 + 1e-12)))) / (1.0 + PERMUTATIONS)
+    return min(smooth, *[one * len(offsets) for one in offsets])  # times their number, as the least is taken
 
 
-def _offset(r: Floats) -> float:
-    """Probability that scatter alone gives values (n,) so large a mean (Student's test); 1 for fewer than five."""
+def _chance_of_mean(values: Floats) -> float:
+    """Probability that scatter alone gives `values` (n,) so large a mean (Student's test); 1 for fewer than
+    five."""
     from scipy.stats import t
 
-    if len(r) < 5:
+    if len(values) < 5:
         return 1.0
-    deviation = float(np.std(r, ddof=1))
+    deviation = float(np.std(values, ddof=1))
     if deviation == 0.0:
         return 1.0
-    return float(2.0 * t.sf(abs(float(np.mean(r))) / deviation * np.sqrt(len(r)), len(r) - 1))
+    return float(2.0 * t.sf(abs(float(np.mean(values))) / deviation * np.sqrt(len(values)), len(values) - 1))
 
 
-def _repeated(edges: BoundaryPoints, normalised: Floats) -> float | None:
-    """Probability that repeated points, or trials of one point, scatter so much that what remains is theirs; None
-    where too few were repeated."""
+def _chance_of_repeats(edges: BoundaryPoints, normalised: Floats) -> float | None:
+    """Probability that the means of repeated points deviate as much by the scatter of the repetitions alone
+    (Fisher's test); None where too few were repeated.
+
+    normalised  (n,) deviations of the points over their scatter
+    """
     from scipy.stats import f
 
     keys = [(str(kind), float(at)) for kind, at in zip(edges.kind, edges.chosen, strict=True) if kind != EDGE]
     groups: dict[tuple[str, float], list[float]] = {}
-    some = normalised[edges.kind != EDGE]
-    for key, r in zip(keys, some.tolist(), strict=True):
+    known_edges = normalised[edges.kind != EDGE]
+    for key, r in zip(keys, known_edges.tolist(), strict=True):
         groups.setdefault(key, []).append(r)
     within = sum(float(np.sum((np.array(g) - np.mean(g)) ** 2)) for g in groups.values())
-    freedom = len(some) - len(groups)
+    freedom = len(known_edges) - len(groups)
     between = sum(len(g) * float(np.mean(g)) ** 2 for g in groups.values())
     if freedom < LEAST_REPEATED or within == 0.0:
         return None

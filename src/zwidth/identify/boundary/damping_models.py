@@ -98,6 +98,7 @@ class DampingModel:
                 raise fail(device.label, "damping_models", text)
             flexible = np.array([0.01 / plant.mass.shape[0]])  # Hz: a start for a device that does not vibrate
         w = 2.0 * pi * float(flexible[0])
+        # of a mode at w the damping ratio is r_m/(2 w) + r_k w/2, the loss factor twice that
         at_drive = float(plant.actuator @ plant.mass @ plant.actuator)
         start = {
             MODAL: [START_RATIO],
@@ -129,7 +130,7 @@ class DampingModel:
         return hysteretic_chart(loop) if self.name == HYSTERETIC else stability_chart(loop, decay=False)
 
     def edge(self, device: Device, numbers: Floats, thinned: int) -> EdgeChords:
-        """The edge of `chart`, `thinned` chords made one; with a loss factor all of `hysteretic_edge`."""
+        """The edge of `chart`, of every `thinned` chords one; with a loss factor all of `hysteretic_edge`."""
         from zwidth.chart.hysteretic_response import hysteretic_edge
 
         if self.name == HYSTERETIC:
@@ -138,10 +139,10 @@ class DampingModel:
 
     def _loop(self, device: Device, numbers: Floats) -> Loop:
         """The loop with these numbers, held by the point's operator."""
-        if device.mechanism is not None and (damping := _of_mechanism(self.name, numbers)) is not None:
+        if device.mechanism is not None and (damping := _mechanism_damping(self.name, numbers)) is not None:
             return replace(device, damping=damping).at_point(self.point).loop
         bare = self._bare_loop(device)
-        plant = _damped(bare.plant, self.name, numbers)
+        plant = _with_damping(bare.plant, self.name, numbers)
         operator = self.point.operator if plant.handle is not None else None
         return Loop(plant if operator is None else attach(plant, operator), bare.controller)
 
@@ -152,10 +153,10 @@ class DampingModel:
                 "a loss factor has no motion in time, and no trials can be simulated with it; leave hysteretic out"
             )
             raise fail(device.label, "damping_models", text)
-        if device.mechanism is not None and (damping := _of_mechanism(self.name, numbers)) is not None:
+        if device.mechanism is not None and (damping := _mechanism_damping(self.name, numbers)) is not None:
             return replace(device, damping=damping).at_point(self.point).contact_loop
         bare = self._bare_loop(device)
-        return Loop(_damped(bare.plant, self.name, numbers), bare.controller)
+        return Loop(_with_damping(bare.plant, self.name, numbers), bare.controller)
 
     def _bare_loop(self, device: Device) -> Loop:
         """The loop without structural damping, and without an operator."""
@@ -179,7 +180,7 @@ def models_of(names: str | Sequence[str], device: Device, point: OperatingPoint)
     return [DampingModel.of(name, device, point) for name in chosen]
 
 
-def _of_mechanism(name: str, numbers: Floats) -> Damping | None:
+def _mechanism_damping(name: str, numbers: Floats) -> Damping | None:
     """The damping of a mechanism by a model's name and numbers (k,); None where a file has no such damping."""
     match name:
         case "modal":
@@ -193,7 +194,7 @@ def _of_mechanism(name: str, numbers: Floats) -> Damping | None:
     return None
 
 
-def _damped(plant: Plant, name: str, numbers: Floats) -> Plant:
+def _with_damping(plant: Plant, name: str, numbers: Floats) -> Plant:
     """A plant with damping by a model's name and numbers (k,) added to what it has."""
     M, K, a = plant.mass, plant.stiffness, plant.actuator
     match name:

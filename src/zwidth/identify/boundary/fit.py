@@ -53,15 +53,15 @@ class BoundaryFit:
     def ends(self, i: int) -> tuple[float, float, float]:
         """The i-th number and the ends of its interval; the bound that the file sets where the data set none."""
         low, high = self.fit.low.copy(), self.fit.high.copy()
-        given = self.parameters
-        limited = ~given.positive & np.isfinite(given.lower) & np.isneginf(low)
-        low = np.where(limited, given.lower, low)
-        columns = (given.values(np.where(np.isnan(x), 0.0, x)) for x in (self.fit.values, low, high))
+        numbers = self.parameters
+        limited = ~numbers.positive & np.isfinite(numbers.lower) & np.isneginf(low)
+        low = np.where(limited, numbers.lower, low)
+        columns = (numbers.values(np.where(np.isnan(x), 0.0, x)) for x in (self.fit.values, low, high))
         value, least, most = (float(column[i]) for column in columns)
         return value, least, most
 
 
-def search_ranges(points: BoundaryPoints) -> Scatter:
+def measured_ranges(points: BoundaryPoints) -> Scatter:
     """How far the measured points reach in stiffness, damping and frequency, each above 0: as a `Scatter`."""
     edges = points[points.on_edge]
     frequency = edges.frequency[edges.frequency > 0.0]
@@ -74,7 +74,7 @@ def search_ranges(points: BoundaryPoints) -> Scatter:
 
 def first_scatter(points: BoundaryPoints) -> Scatter:
     """The scatter that a fit begins with: `FIRST_SCATTER` of the measured ranges."""
-    return Scatter(*(FIRST_SCATTER * one for one in search_ranges(points)))
+    return Scatter(*(FIRST_SCATTER * one for one in measured_ranges(points)))
 
 
 def fit_boundary(
@@ -89,20 +89,28 @@ def fit_boundary(
     profiled  False: intervals by the curvature alone
     Raises    ValueError  for fewer points on the boundary than numbers
     """
-    reach, x = search_ranges(model.points), start
+    ranges, vector = measured_ranges(model.points), start
     scatter = first_scatter(model.points)
-    if x is None:
-        x = _best_start(model, parameters, scatter)
-    step = COARSE_STEP if model.interpolated(x) else None
+    if vector is None:
+        vector = _best_start(model, parameters, scatter)
+    step = COARSE_STEP if model.interpolated(vector) else None
     for _ in range(ROUNDS):
-        fit = _fit(model, parameters, scatter, x, step, tolerance=COARSE, profiled=False)
-        x, before = fit.values, scatter
-        scatter = _scatter(model, fit, scatter, reach)
+        fit = _fit(model, parameters, scatter, vector, step, tolerance=COARSE, profiled=False)
+        vector, before = fit.values, scatter
+        scatter = _remaining_scatter(model, fit, scatter, ranges)
         if all(abs(a / b - 1.0) < SAME_SCATTER for a, b in zip(scatter, before, strict=True)):
             break
-    freedom, widening = _freedom(model, x, scatter)
+    freedom, widening = _freedom_and_widening(model, vector, scatter)
     fit = _fit(
-        model, parameters, scatter, x, step, profiled=profiled, freedom=freedom, widening=widening, tolerance=FINE
+        model,
+        parameters,
+        scatter,
+        vector,
+        step,
+        profiled=profiled,
+        freedom=freedom,
+        widening=widening,
+        tolerance=FINE,
     )
     return BoundaryFit(parameters, fit, scatter, model.deviations(fit.values, scatter), freedom)
 
@@ -119,7 +127,10 @@ def _fit(
     freedom: Floats | None = None,
     widening: Floats | float = 1.0,
 ) -> Fit:
-    """Fit the numbers with a known scatter, from a start (p,); the other arguments as in `fit_least_squares`."""
+    """Fit the numbers with a known scatter, from a start (p,).
+
+    step, freedom  as diff_step and scale_freedom in `fit_least_squares`, the others as they are called there
+    """
     return fit_least_squares(
         lambda vector: model.residuals(vector, scatter),
         start,
@@ -167,11 +178,11 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
     return min(fits, key=lambda fit: fit.sum_of_squares).values
 
 
-def _parts(model: BoundaryModel) -> dict[str, Flags]:
+def _residuals_by_kind(model: BoundaryModel) -> dict[str, Flags]:
     """Kind -> which residuals (m,) are along stiffness, along damping, of frequencies, and of unknown edges."""
     edges = model.points[model.points.on_edge]
-    seen = int(np.sum(edges.frequency > 0.0))
-    total = len(edges) + seen + int(np.sum(~model.points.on_edge))
+    frequencies = int(np.sum(edges.frequency > 0.0))
+    total = len(edges) + frequencies + int(np.sum(~model.points.on_edge))
     place = np.arange(total)
 
     def of(*kinds: str) -> Flags:
@@ -180,57 +191,63 @@ def _parts(model: BoundaryModel) -> dict[str, Flags]:
     return {
         "stiffness": of(TIP),
         "damping": of(LOWER, UPPER),
-        "frequency": (place >= len(edges)) & (place < len(edges) + seen),
+        "frequency": (place >= len(edges)) & (place < len(edges) + frequencies),
         "distance": of(EDGE),
     }
 
 
-def _scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) -> Scatter:
+def _remaining_scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) -> Scatter:
     """Standard deviations of what remains, of each kind of points, after a fit with the scatter `before`.
 
     Of a kind with few points it is at least in the same proportion to the measured range as those of the others:
     few points that happen to lie well would rule the fit.
 
-    reach  of the points, `search_ranges`
+    reach  of the points, `measured_ranges`
     """
-    freedom, parts = _freedom_by_kind(model, fit.values, before), _parts(model)
-    own = dict[str, float]()
-    for name, most, now in zip(Scatter._fields, reach, before, strict=True):
+    freedom, parts = _freedom_by_kind(model, fit.values, before), _residuals_by_kind(model)
+    own = dict[str, float]()  # kind -> its deviation as a share of the measured range
+    for name, span, deviation in zip(Scatter._fields, reach, before, strict=True):
         part = parts[name] | (parts["distance"] if name == "damping" else False)
         if part.any():
+            # points of unknown edges deviate in units of both, and count with the damping
             nu = max(freedom[name] + (freedom["distance"] if name == "damping" else 0.0), 0.5)
-            own[name] = max(now * float(np.sqrt(np.sum(fit.residuals[part] ** 2) / nu)) / most, LEAST_SCATTER)
+            own[name] = max(
+                deviation * float(np.sqrt(np.sum(fit.residuals[part] ** 2) / nu)) / span, LEAST_SCATTER
+            )
     counts = {name: int(np.sum(parts[name])) for name in own}
     known = [own[name] for name in own if counts[name] >= ENOUGH] or list(own.values())
     usual = float(np.sqrt(np.mean(np.square(known))))
-    if "stiffness" in own and counts["stiffness"] < ENOUGH and "damping" in own:
+    if "stiffness" in own and counts["stiffness"] < ENOUGH and "damping" in own:  # few tips follow the dampings
         usual = own["damping"]
     shares = [
         own.get(name, usual) if counts.get(name, 0) >= ENOUGH else max(own.get(name, usual), usual)
         for name in Scatter._fields
     ]
-    return Scatter(*(share * most for share, most in zip(shares, reach, strict=True)))
+    return Scatter(*(share * span for share, span in zip(shares, reach, strict=True)))
 
 
-def _shares(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, Floats]:
-    """Kind of points -> share (p,) of each number's variance that stems from them; 0 where they do not tell it."""
+def _variance_shares(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, Floats]:
+    """Kind of points -> share (p,) of each number's variance that stems from their scatter; 0 where they do not
+    tell it."""
     jacobian = derivatives(model, vector, scatter)
-    parts = _parts(model)
-    information = jacobian[np.any(list(parts.values()), axis=0)]
-    inverse = np.linalg.pinv(information.T @ information)
-    size = np.maximum(np.diag(inverse), 1e-300)
+    parts = _residuals_by_kind(model)
+    of_points = jacobian[np.any(list(parts.values()), axis=0)]
+    covariance = np.linalg.pinv(of_points.T @ of_points)
+    size = np.maximum(np.diag(covariance), 1e-300)
     return {
-        name: np.diag(inverse @ jacobian[part].T @ jacobian[part] @ inverse) / size for name, part in parts.items()
+        name: np.diag(covariance @ jacobian[part].T @ jacobian[part] @ covariance) / size
+        for name, part in parts.items()
     }
 
 
 def _freedom_by_kind(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, float]:
-    """Kind of points -> number of points, less the numbers that are told by them."""
-    shares, parts = _shares(model, vector, scatter), _parts(model)
+    """Kind of points -> number of points, less the shares of the fitted numbers that they tell,
+    `_variance_shares`."""
+    shares, parts = _variance_shares(model, vector, scatter), _residuals_by_kind(model)
     return {name: float(np.sum(part)) - float(np.sum(shares[name])) for name, part in parts.items()}
 
 
-def _freedom(model: BoundaryModel, vector: Floats, scatter: Scatter) -> tuple[Floats, Floats]:
+def _freedom_and_widening(model: BoundaryModel, vector: Floats, scatter: Scatter) -> tuple[Floats, Floats]:
     """Degrees of freedom (p,) by which the scatter is known (Satterthwaite), and the factors (p,) by which the
     intervals are wider since the points' weights were estimated, too.
 
@@ -239,19 +256,22 @@ def _freedom(model: BoundaryModel, vector: Floats, scatter: Scatter) -> tuple[Fl
     it smaller, than with known ones: together 1 + 4 sum p_k (1 - p_k) / (nu_k + 2) to first order (Sinha 1985,
     known at second hand, for a common mean). Few tips have the weight of the points along damping: one kind.
     """
-    shares, by_kind = _shares(model, vector, scatter), _freedom_by_kind(model, vector, scatter)
-    nu = {name: max(value, 0.5) for name, value in by_kind.items()}
-    spread = sum(shares[name] ** 2 / nu[name] for name in nu)
-    known = np.divide(1.0, spread, out=np.full(len(vector), np.inf), where=np.asarray(spread) > 0.0)
-    joined = dict(shares)
-    if np.sum(_parts(model)["stiffness"]) < ENOUGH:
-        joined["damping"] = joined["damping"] + joined.pop("stiffness")
-    wider = 1.0 + 4.0 * sum(np.clip(p * (1.0 - p), 0.0, None) / (nu[name] + 2.0) for name, p in joined.items())
+    shares, by_kind = _variance_shares(model, vector, scatter), _freedom_by_kind(model, vector, scatter)
+    freedoms = {name: max(value, 0.5) for name, value in by_kind.items()}
+    per_freedom = sum(shares[name] ** 2 / freedoms[name] for name in freedoms)
+    known = np.divide(1.0, per_freedom, out=np.full(len(vector), np.inf), where=np.asarray(per_freedom) > 0.0)
+    joined_shares = dict(shares)
+    if np.sum(_residuals_by_kind(model)["stiffness"]) < ENOUGH:
+        joined_shares["damping"] = joined_shares["damping"] + joined_shares.pop("stiffness")
+    wider = 1.0 + 4.0 * sum(
+        np.clip(share * (1.0 - share), 0.0, None) / (freedoms[name] + 2.0) for name, share in joined_shares.items()
+    )
     return np.maximum(np.minimum(sum(by_kind.values()), known), 1.0), np.sqrt(wider)
 
 
 def derivatives(model: BoundaryModel, vector: Floats, scatter: Scatter) -> Floats:
-    """Change (m, p) of what remains per change of each number, by central differences."""
+    """Change (m, p) of `BoundaryModel.residuals` per change of each number of a vector (p,), by central
+    differences."""
     columns = []
     for i, value in enumerate(vector.tolist()):
         ends, step = [], COARSE_STEP * max(abs(value), 1e-3)
@@ -270,20 +290,23 @@ def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, 
     Each kind of points has its own standard deviation, of which the likelihood is largest at what remains:
     sum n ln(SS / n); tried walls add -2 ln Phi(d).
     """
-    reach, residuals = search_ranges(model.points), fit.fit.residuals
-    total, count, kinds, used = 0.0, 0, 0, np.zeros(len(residuals), dtype=bool)
-    for name, part in _parts(model).items():
+    reach, residuals = measured_ranges(model.points), fit.fit.residuals
+    total, count, kinds, counted = 0.0, 0, 0, np.zeros(len(residuals), dtype=bool)
+    for name, part in _residuals_by_kind(model).items():
         if part.any():
-            its = "damping" if name == "distance" else name
-            size = getattr(fit.scatter, its) / getattr(reach, its)
-            mean = float(np.mean(residuals[part] ** 2)) * size**2
-            total += float(np.sum(part)) * float(np.log(max(mean, LEAST_SCATTER**2)))
-            count, kinds, used = count + int(np.sum(part)), kinds + 1, used | part
-    return total + float(np.sum(residuals[~used] ** 2)), count, kinds
+            # residuals are in units of the scatter: here as shares of the measured range
+            scatter_name = "damping" if name == "distance" else name
+            share = getattr(fit.scatter, scatter_name) / getattr(reach, scatter_name)
+            mean_square = float(np.mean(residuals[part] ** 2)) * share**2
+            total += float(np.sum(part)) * float(np.log(max(mean_square, LEAST_SCATTER**2)))
+            count, kinds, counted = count + int(np.sum(part)), kinds + 1, counted | part
+    return total + float(np.sum(residuals[~counted] ** 2)), count, kinds
 
 
-def without_points(points: BoundaryPoints, every: int = 3) -> Flags:
-    """Which points (n,) are kept where every third (`every`) on the boundary is left out, along each edge."""
+def kept_points(points: BoundaryPoints, every: int = 3) -> Flags:
+    """Which points (n,) are kept where every third (`every`) on the boundary is left out, along each edge; all
+    walls that were tried are kept.
+    """
     order = np.lexsort((points.chosen, points.kind, ~points.on_edge))
     keep = np.ones(len(points), dtype=bool)
     keep[order[: int(points.on_edge.sum())][1::every]] = False

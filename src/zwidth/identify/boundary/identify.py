@@ -36,8 +36,8 @@ from zwidth.identify.boundary.fit import (
     derivatives,
     first_scatter,
     fit_boundary,
+    kept_points,
     log_likelihood,
-    without_points,
 )
 from zwidth.identify.boundary.model import BoundaryModel
 from zwidth.identify.boundary.parameters import BoundaryParameters
@@ -105,9 +105,9 @@ def identify_boundary(
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     plan = TrialPlan.of(points, point, disturbance, visible) if simulated else None
-    checks.append(_route(point, plan))
-    fits = [(_model(points, one, plan, report), one) for one in choices]
-    checks += [*_without_edge(fits, records), _moves_boundary(fits[0][0], fits[0][1])]
+    checks.append(_check_route(point, plan))
+    fits = [(_points_beside_edges(points, one, plan, report), one) for one in choices]
+    checks += [*_lost_point_checks(fits, records), _check_moves_boundary(fits[0][0], fits[0][1])]
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     comparison = compare_models(fits, report)
@@ -124,6 +124,7 @@ def _held_device(
 ) -> tuple[Device, OperatingPoint]:
     """Check the arguments of `identify_boundary`; return the device as it is held, and where it is used.
 
+    point   None: the device's reference
     Raises  DeviceError  without records or numbers to fit, and for another word in `through`
     """
     if not records:
@@ -162,14 +163,14 @@ def _validated(
         if (nothing := refused(KIND, device.label, checks)) is not None:
             return nothing
     report("validating", 0, 0)
-    share, sentence = _validate(model, fit)
+    share, unseen = _validate(model, fit)
     return Identification(
         kind=KIND,
         label=device.label,
         checks=tuple(checks),
         estimates=_estimates(fit),
         validation=share,
-        validated_on=sentence,
+        validated_on=unseen,
         remarks=(*_remarks(model, fit, records), *comparison.sentences),
         curves=_curves(model, fit),
         details=_details(model, fit, comparison, plan),
@@ -186,8 +187,11 @@ def _own_edge(parameters: BoundaryParameters, point: OperatingPoint) -> EdgeChor
         raise fail(parameters.device.label, "", f"has no chart to compare the points with: {error}") from None
 
 
-def _route(point: OperatingPoint, plan: TrialPlan | None) -> Check:
-    """Check that says what the points are compared with, and why; a warning of what the chart leaves out."""
+def _check_route(point: OperatingPoint, plan: TrialPlan | None) -> Check:
+    """Check that says what the points are compared with, and why; a warning of what the chart leaves out.
+
+    plan  of the trials; None: the chart is compared
+    """
     if plan is not None:
         return Check("compared with", True, plan.sentence)
     omitted = point.contact_loop.nonlinear.kinds if point.response is None else ()
@@ -197,7 +201,7 @@ def _route(point: OperatingPoint, plan: TrialPlan | None) -> Check:
     return Check("compared with", True, f"{text}, as nothing of it makes the boundary hang on the amplitude")
 
 
-def _model(
+def _points_beside_edges(
     points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan | None, report: Progress
 ) -> BoundaryModel:
     """The points beside exact edges, or, with a plan of trials, beside simulated ones."""
@@ -205,7 +209,7 @@ def _model(
     return model if plan is None else model_by_trials(model, parameters, plan, report)
 
 
-def _without_edge(
+def _lost_point_checks(
     fits: Sequence[tuple[BoundaryModel, BoundaryParameters]], records: Sequence[Record]
 ) -> list[Check]:
     """A warning that names the points at which the trials of a model have no edge, so that they do not count."""
@@ -226,7 +230,7 @@ def _without_edge(
     return checks
 
 
-def _moves_boundary(model: BoundaryModel, parameters: BoundaryParameters) -> Check:
+def _check_moves_boundary(model: BoundaryModel, parameters: BoundaryParameters) -> Check:
     """Check that each number moves the boundary at all, at the values of the file."""
     J = derivatives(model, parameters.start, first_scatter(model.points))
     names = [what for what, _, _ in parameters.named]
@@ -244,22 +248,22 @@ def _check_told_apart(fit: BoundaryFit) -> list[Check]:
     """A warning for each pair of numbers of which the points tell little more than a combination; a failed check
     of numbers that they do not tell at all."""
     names = [what for what, _, _ in fit.parameters.named]
-    C = fit.fit.covariance
-    size = np.sqrt(np.diag(C))
+    covariance = fit.fit.covariance
+    deviations = np.sqrt(np.diag(covariance))
     checks = list[Check]()
     for i in range(len(names)):
         for j in range(i):
-            if not (np.isfinite(size[[i, j]]).all() and size[i] * size[j] > 0.0):
+            if not (np.isfinite(deviations[[i, j]]).all() and deviations[i] * deviations[j] > 0.0):
                 continue
-            alike = float(C[i, j] / (size[i] * size[j]))
-            if abs(alike) > ALIKE:
+            correlation = float(covariance[i, j] / (deviations[i] * deviations[j]))
+            if abs(correlation) > ALIKE:
                 text = (
                     f"{names[j]} and {names[i]} change the boundary in nearly the same way (correlation "
-                    f"{alike:.3f}): their combination is known better than either; measure the frequencies, or "
-                    "points on the other edge, or fix one"
+                    f"{correlation:.3f}): their combination is known better than either; measure the frequencies, "
+                    "or points on the other edge, or fix one"
                 )
                 checks.append(Check("told apart", False, text, warning=True))
-    unknown = [name for name, its in zip(names, size, strict=True) if not np.isfinite(its)]
+    unknown = [name for name, deviation in zip(names, deviations, strict=True) if not np.isfinite(deviation)]
     if unknown:
         checks.append(Check("told apart", False, f"the points do not tell {comma_list(unknown)} from the others"))
     return checks
@@ -269,7 +273,7 @@ def _validate(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, str]:
     """Share of the spread of every third point that a fit to the others explains, nan of too few points; and which
     points these are, a sentence."""
     edges = int(model.points.on_edge.sum())
-    kept = without_points(model.points)
+    kept = kept_points(model.points)
     left = int(np.sum(kept & model.points.on_edge))
     if edges < FEWEST_VALIDATED or left < len(fit.vector) + 1:
         return float("nan"), f"nothing: {plural(edges, 'point')} on the boundary are too few to leave some out"
@@ -287,8 +291,8 @@ def _estimates(fit: BoundaryFit) -> tuple[Estimate, ...]:
     """The fitted numbers with their intervals."""
     ends = [fit.ends(i) for i in range(len(fit.vector))]
     return tuple(
-        Estimate(what, *its, unit, path)
-        for (what, unit, path), its in zip(fit.parameters.named, ends, strict=True)
+        Estimate(what, *value_low_high, unit, path)
+        for (what, unit, path), value_low_high in zip(fit.parameters.named, ends, strict=True)
     )
 
 
@@ -467,11 +471,17 @@ class DampingComparison:
 def compare_models(
     fits: Sequence[tuple[BoundaryModel, BoundaryParameters]], report: Progress
 ) -> DampingComparison:
-    """Fit each model to its points, and the best one again with intervals."""
+    """Fit each model to its points, and the best one again with intervals.
+
+    fits  of each model: the points beside its edges, and its numbers;   report  as `progress` of
+          `identify_boundary`
+    """
     fitted = list[FittedModel]()
     for number, (model, parameters) in enumerate(fits):
         report("fitting", number, len(fits))
-        fitted.append(_fitted(model, parameters, _start(parameters, fitted), profiled=len(fits) == 1))
+        fitted.append(
+            _fitted(model, parameters, _start_of_hysteretic(parameters, fitted), profiled=len(fits) == 1)
+        )
     order = sorted(range(len(fitted)), key=lambda i: (fitted[i].criterion, i))
     ranked = [fitted[i] for i in order]
     if len(fits) > 1:
@@ -481,7 +491,7 @@ def compare_models(
     return DampingComparison(tuple(ranked))
 
 
-def _start(parameters: BoundaryParameters, before: Sequence[FittedModel]) -> Floats | None:
+def _start_of_hysteretic(parameters: BoundaryParameters, before: Sequence[FittedModel]) -> Floats | None:
     """Vector (p,) from which a loss factor is fitted: twice the damping ratio that was fitted before, as a search
     is slow; None, so that a start is searched for, of other models.
 
@@ -490,16 +500,20 @@ def _start(parameters: BoundaryParameters, before: Sequence[FittedModel]) -> Flo
     if parameters.damping is None or parameters.damping.name != HYSTERETIC:
         return None
     modal = [one.fit.vector for one in before if one.name == MODAL]
+    # the last number is the model's, by its logarithm
     return modal[0] + np.append(np.zeros(len(modal[0]) - 1), np.log(2.0)) if modal else None
 
 
 def _fitted(
     model: BoundaryModel, parameters: BoundaryParameters, start: Floats | None, *, profiled: bool
 ) -> FittedModel:
-    """Fit a model from a start (p,), None: the best of several; with its criteria and share explained."""
+    """Fit a model from a start (p,), None: the best of several; with its criteria and share explained.
+
+    profiled  False: intervals by the curvature alone
+    """
     fit = fit_boundary(model, parameters, start=start, profiled=profiled)
     minus_twice, count, kinds = log_likelihood(model, fit)
-    k = len(fit.vector) + kinds
+    k = len(fit.vector) + kinds  # numbers, and standard deviations, that were estimated
     correction = 2.0 * k * (k + 1.0) / max(count - k - 1.0, 1.0)
     damping = parameters.damping
     return FittedModel(

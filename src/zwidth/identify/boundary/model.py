@@ -96,18 +96,19 @@ class BoundaryModel:
             some = points.of(edge)
             if some.any():
                 kind: EdgeKind = edge  # type: ignore[assignment]
-                along = 0 if edge == TIP else 1
-                at, there = chords.crossings(points.chosen[some], points.bisected[some], kind)
-                lost = np.isnan(at)
-                place = exact[some]
-                place[:, along] = at
-                place[lost] = _nearest_walls(chords, points.chosen[some][lost], edge)
-                exact[some], frequency[some], missing[some] = place, there, lost
-                value[some] = points.bisected[some] - place[:, along]
+                along = 0 if edge == TIP else 1  # 0 stiffness, 1 damping
+                crossed, crossed_Hz = chords.crossings(points.chosen[some], points.bisected[some], kind)
+                uncrossed = np.isnan(crossed)
+                walls = exact[some]
+                walls[:, along] = crossed
+                walls[uncrossed] = _nearest_walls(chords, points.chosen[some][uncrossed], edge)
+                exact[some], frequency[some], missing[some] = walls, crossed_Hz, uncrossed
+                value[some] = points.bisected[some] - walls[:, along]
                 across = 1 - along
                 units = (scatter.stiffness, scatter.damping)
-                gap = (points.chosen[some] - place[:, across]) / units[across] * units[along]
-                value[some] = np.where(lost, np.hypot(value[some], gap), value[some])
+                # how far the nearest wall is off the line, in the unit of what was bisected
+                gap = (points.chosen[some] - walls[:, across]) / units[across] * units[along]
+                value[some] = np.where(uncrossed, np.hypot(value[some], gap), value[some])
         some = points.of(EDGE)
         if some.any():
             K, B = points.stiffness[some], points.damping[some]
@@ -161,9 +162,9 @@ class BoundaryModel:
 def _nearest_walls(chords: EdgeChords, chosen: Floats, edge: str) -> Floats:
     """Walls (m, 2) of the edge nearest to lines that it does not cross; the origin where there is no edge.
 
-    chosen  (m,) the lines: damping of a tip [N s/m], else stiffness [N/m]
+    chosen  (m,) the lines: damping of a tip [N s/m], else stiffness [N/m];   edge  LOWER, UPPER or TIP
     """
-    across = 1 if edge == TIP else 0
+    across = 1 if edge == TIP else 0  # column of the damping, of the stiffness
     if not len(chords):
         return np.zeros((len(chosen), 2))
     vertex = np.argmin(np.abs(chords.first[:, across] - chosen[:, None]), axis=1)
@@ -191,13 +192,13 @@ def relative_scatter(points: BoundaryPoints) -> Floats:
     for kinds in ((TIP,), (EDGE,), tuple(set(points.kind.tolist()) - {TIP, EDGE})):
         some = points.of(*kinds)
         if some.any():
-            size = _sizes(points[some])
+            size = _relative_deviations(points[some])
             relative[some] = size / np.sqrt(np.mean(size**2))
     return relative
 
 
-def _sizes(points: BoundaryPoints) -> Floats:
-    """Standard deviations (n,) of points of one kind, up to a common factor."""
+def _relative_deviations(points: BoundaryPoints) -> Floats:
+    """Standard deviations (n,) of points of one kind, up to a common factor: s / sqrt(n) of `relative_scatter`."""
     from scipy.stats import norm
 
     trials = np.maximum(points.trials, 1.0)

@@ -71,8 +71,8 @@ class BoundaryParameters:
     @property
     def start(self) -> Floats:
         """The vector of the file's numbers, and of those that a damping model begins with."""
-        own = self.numbers.vector(self.numbers.start)
-        return own if self.damping is None else np.append(own, np.log(self.damping.start))
+        of_file = self.numbers.vector(self.numbers.start)
+        return of_file if self.damping is None else np.append(of_file, np.log(self.damping.start))
 
     @property
     def positive(self) -> Flags:
@@ -84,8 +84,8 @@ class BoundaryParameters:
     def named(self) -> list[tuple[str, str, str]]:
         """What each number is, its unit, and its path in the device file."""
         document = self.device.document
-        own = [(path, key_unit(address.resolve(document, path)), path) for path in self.numbers.paths]
-        return own if self.damping is None else own + self.damping.numbers
+        of_file = [(path, key_unit(address.resolve(document, path)), path) for path in self.numbers.paths]
+        return of_file if self.damping is None else of_file + self.damping.numbers
 
     def values(self, vector: Floats) -> Floats:
         """The numbers (..., p) of vectors (..., p); inf where a logarithm, as of an open end, is too large."""
@@ -145,7 +145,7 @@ class BoundaryParameters:
         if self.positive[i]:
             tried = self.start[i] + np.log(FACTORS)
         else:
-            size = self._size(i)
+            size = self._usual_change(i)
             tried = self.start[i] + size * np.array([-10.0, -3.0, -1.0, 1.0, 3.0, 10.0, 30.0])
         return np.asarray(tried[(tried > self.lower[i]) & (tried < self.upper[i])])
 
@@ -154,13 +154,13 @@ class BoundaryParameters:
         tried = self.start[i] + np.log(NEAR if self.positive[i] else ())
         return np.asarray(tried[(tried > self.lower[i]) & (tried < self.upper[i])])
 
-    def _size(self, i: int) -> float:
+    def _usual_change(self, i: int) -> float:
         """A usual change of the i-th number: 0.3 of it; where it is 0, the power of ten by which it must change
         for the largest stiffness of the chart to change by a hundredth."""
         if self.start[i] != 0.0:
             return 0.3 * abs(float(self.start[i]))
         try:
-            before = self.edge(self.start).box[1]
+            before = self.edge(self.start).box[1]  # largest stiffness [N/m]
         except ValueError:
             return 1.0
         for size in 10.0 ** np.arange(-9.0, 10.0):

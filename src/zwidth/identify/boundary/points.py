@@ -150,7 +150,7 @@ def _points_of(record: Record, index: int) -> BoundaryPoints:
     columns = record.columns()
     count = len(next(iter(columns.values()), ()))
     nothing = np.full(count, np.nan)
-    K, B = (_walls(record, columns, names) for names in (STIFFNESS, DAMPING))
+    K, B = (_wall_numbers(record, columns, names) for names in (STIFFNESS, DAMPING))
     kind = _kinds(record, columns, count)
     damping_low, damping_high, stiffness_low, stiffness_high = (columns.get(name, nothing) for name in SPREADS)
     tip = kind == TIP
@@ -179,7 +179,7 @@ def _points_of(record: Record, index: int) -> BoundaryPoints:
     )
 
 
-def _walls(record: Record, columns: dict[str, NDArray[Any]], names: tuple[str, ...]) -> Floats:
+def _wall_numbers(record: Record, columns: dict[str, NDArray[Any]], names: tuple[str, ...]) -> Floats:
     """Stiffness or damping of the rows, in the column that is there of these names; an empty cell stays nan."""
     name = next(name for name in names if name in columns)
     values = columns[name]
@@ -195,7 +195,10 @@ def _walls(record: Record, columns: dict[str, NDArray[Any]], names: tuple[str, .
 
 
 def _kinds(record: Record, columns: dict[str, NDArray[Any]], count: int) -> NDArray[np.str_]:
-    """`BoundaryPoints.kind` of each row (n,); a row of which no column says anything lies on the boundary."""
+    """`BoundaryPoints.kind` of each row (n,); a row of which no column says anything lies on the boundary.
+
+    columns  of the record by name, each of `count` rows
+    """
     kind = np.full(count, EDGE, dtype="U8")
     for name in ("kind", "verdict", "edge"):  # lower, upper and tip say more than boundary
         for row, word in enumerate(_plain_words(columns[name]) if name in columns else ()):

@@ -72,7 +72,10 @@ class TrialPlan:
     ) -> TrialPlan:
         """The plan that the circumstances of the points call for: a bias force pushes on a one-sided wall, a
         perturbation displaces the device by what it bends the wall. What a point does not say is the median of
-        those that do."""
+        those that do.
+
+        disturbance, visible  of all trials [m]; None: as each point says it
+        """
         loop = point.contact_loop
         step = max((counter.step for counter in loop.plant.nonlinear.counters), default=0.0)
         pushes, forces, times = (
@@ -154,7 +157,10 @@ def trial_of(how: Disturbing, parameters: BoundaryParameters, vector: Floats) ->
 
 
 def needs_trials(point: OperatingPoint, through: str | None) -> bool:
-    """Whether the points are to be compared with trials: by the user's word, or as friction wants it."""
+    """Whether the points are to be compared with trials: by the user's word, or as friction wants it.
+
+    through  "chart" or "experiment", as the user says; None: left to the device
+    """
     if through:
         return through == "experiment"
     if point.response is not None or point.charted_by_response:
@@ -178,7 +184,7 @@ class EdgeCrossing(NamedTuple):
     frequency: Floats
 
     def only(self, some: Flags) -> EdgeCrossing:
-        """Some of the edges."""
+        """The edges for which `some` (n,) is true."""
         return EdgeCrossing(self.value[some], self.tip[some], self.inward[some], self.frequency[some])
 
 
@@ -199,7 +205,7 @@ class SimulatedEdges:
         return np.asarray(self.at.value + self.slopes @ (vector - self.centre))
 
     def only(self, some: Flags) -> SimulatedEdges:
-        """Some of the edges."""
+        """The edges for which `some` (n,) is true."""
         return SimulatedEdges(self.centre, self.at.only(some), self.slopes[some])
 
 
@@ -250,22 +256,22 @@ def model_by_trials(
     """
     label = parameters.device.label
     x = fit_boundary(model, parameters, profiled=False).vector
-    x = np.clip(x, parameters.start - 3.0, parameters.start + 3.0)
+    x = np.clip(x, parameters.start - 3.0, parameters.start + 3.0)  # by a factor of 20 at most
     slopes, sloped_at = np.empty((0, 0)), np.full(len(x), np.inf)
     by_trials: BoundaryModel = model
     for number in range(ROUNDS):
         report("simulating trials", number, ROUNDS)
         try:
             if not np.max(np.abs(x - sloped_at)) < SAME_SLOPES:
-                slopes, sloped_at = _slopes(model.points, parameters, plan, x), x
-            by_trials = _around(model, parameters, plan, x, slopes)
+                slopes, sloped_at = _edge_slopes(model.points, parameters, plan, x), x
+            by_trials = _model_at(model, parameters, plan, x, slopes)
         except (ArgumentError, ValueError) as error:
             raise fail(label, "", f"no trials can be simulated: {error}") from None
         if int(by_trials.points.on_edge.sum()) < len(x) + 1:
             edges = int(by_trials.points.on_edge.sum())
             raise fail(label, "", f"the simulated device has an edge at {edges} of the points only")
         new = fit_boundary(by_trials, parameters, start=x, profiled=False).vector
-        new = np.clip(new, x - 1.0, x + 1.0)
+        new = np.clip(new, x - 1.0, x + 1.0)  # as far as the linear edges may hold
         moved, x = float(np.max(np.abs(new - x))), new
         if moved < STAYS:
             break
@@ -273,48 +279,50 @@ def model_by_trials(
     return by_trials
 
 
-def _around(
+def _model_at(
     model: BoundaryModel, parameters: BoundaryParameters, plan: TrialPlan, x: Floats, slopes: Floats
 ) -> TrialModel:
     """The model with edges simulated at numbers x (p,), which move with them by known slopes (n, p)."""
-    at = _simulated(model.points, parameters, plan, x)
+    at = _simulated_edges(model.points, parameters, plan, x)
     known = np.isfinite(at.value) & np.isfinite(slopes).all(axis=1)
     edges = SimulatedEdges(x, at, slopes).only(known)
     return TrialModel(model.points[known], model.edge_of, simulated=edges, lost=model.points[~known])
 
 
-def _slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> Floats:
+def _edge_slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> Floats:
     """Derivatives (n, p) of the simulated edges by the numbers at x (p,), by central differences; nan where they
     are not the same edge on both sides."""
     slopes = []
     for i in range(len(x)):
-        ends, places = list[EdgeCrossing](), []
+        edges, values = list[EdgeCrossing](), []
         for side in (-1.0, 1.0):
             moved = x.copy()
             step = MOVED if parameters.positive[i] else MOVED * max(abs(float(x[i])), 0.1)
             moved[i] = np.clip(x[i] + side * step, parameters.lower[i], parameters.upper[i])
-            ends.append(_simulated(points, parameters, plan, moved))
-            places.append(float(moved[i]))
-        one, other = ends
+            edges.append(_simulated_edges(points, parameters, plan, moved))
+            values.append(float(moved[i]))
+        one, other = edges
         same = (one.tip == other.tip) & (one.inward == other.inward)
-        slopes.append(np.where(same, (other.value - one.value) / (places[1] - places[0]), np.nan))
+        slopes.append(np.where(same, (other.value - one.value) / (values[1] - values[0]), np.nan))
     return np.column_stack(slopes)
 
 
-def _simulated(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> EdgeCrossing:
+def _simulated_edges(
+    points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats
+) -> EdgeCrossing:
     """What trials with numbers x (p,) find at the points and at the walls that were tried, each disturbed in its
     own way."""
-    chart = parameters.edge(x)
-    _, K1, _, B1 = chart.box  # largest stiffness [N/m] and damping [N s/m] of the chart's edge
-    tip = chart.first[int(np.argmax(chart.first[:, 0]))] if len(chart) else np.array([K1, B1])
-    place = StableExtent(float(tip[0]), max(float(tip[1]), 0.05 * B1), B1, True)
+    edge = parameters.edge(x)
+    _, K1, _, B1 = edge.box  # largest stiffness [N/m] and damping [N s/m] of the chart's edge
+    stiffest = edge.first[int(np.argmax(edge.first[:, 0]))] if len(edge) else np.array([K1, B1])
+    extent = StableExtent(float(stiffest[0]), max(float(stiffest[1]), 0.05 * B1), B1, True)
     found = EdgeCrossing(
         np.full(len(points), np.nan), points.kind == TIP, np.ones(len(points)), np.full(len(points), np.nan)
     )
     for how, group in plan.groups().items():
-        one = _crossings(points[group], trial_of(how, parameters, x), place)
-        for all_of_them, own in zip(found, one, strict=True):
-            all_of_them[group] = own
+        in_group = _crossings(points[group], trial_of(how, parameters, x), extent)
+        for whole, part in zip(found, in_group, strict=True):  # value, tip, inward, frequency
+            whole[group] = part
     return found
 
 
@@ -324,25 +332,26 @@ def _crossings(points: BoundaryPoints, trial: StabilityTrial, place: StableExten
 
     place  where stable walls are looked for
     """
+    # kind of edge and chosen number -> bisected number and frequency
     ends = dict[tuple[str, float], tuple[float, float]]()
     along = points.kind != TIP
     if along.any():
         for edge in measure_edges(trial, np.unique(points.stiffness[along]), place):
             ends[edge.edge, edge.stiffness] = edge.damping, edge.frequency
-    nothing = (float("nan"), float("nan"))
+    no_edge = (float("nan"), float("nan"))
     count = len(points)
     value, frequency, inward = np.full(count, np.nan), np.full(count, np.nan), np.ones(count)
     for i in np.flatnonzero(along):
         kinds = (str(points.kind[i]),) if points.kind[i] in (LOWER, UPPER) else (LOWER, UPPER)
-        own = [(kind, *ends.get((kind, float(points.stiffness[i])), nothing)) for kind in kinds]
-        if known := [one for one in own if not isnan(one[1])]:
+        found = [(kind, *ends.get((kind, float(points.stiffness[i])), no_edge)) for kind in kinds]
+        if known := [one for one in found if not isnan(one[1])]:
             kind, value[i], frequency[i] = min(known, key=lambda one: abs(one[1] - points.damping[i]))
             inward[i] = 1.0 if kind == LOWER else -1.0
     tip = ~along | (points.of(STABLE, UNSTABLE) & np.isnan(value))
     if tip.any():
-        inward[tip] = -1.0
+        inward[tip] = -1.0  # softer walls are stable
         tips = measure_tips(trial, np.unique(points.damping[tip]), place)
         ends = {(TIP, edge.damping): (edge.stiffness, edge.frequency) for edge in tips}
         for i in np.flatnonzero(tip):
-            value[i], frequency[i] = ends.get((TIP, float(points.damping[i])), nothing)
+            value[i], frequency[i] = ends.get((TIP, float(points.damping[i])), no_edge)
     return EdgeCrossing(value, tip, inward, frequency)

@@ -119,7 +119,7 @@ def identify_impedance(
     checks += coherence_checks
     if not states:
         return Identification(KIND, device.label, tuple(checks))
-    checks += [check for state in states for check in _check_against(state, wall)]
+    checks += [check for state in states for check in _check_against_prediction(state, wall)]
     if any(not (check.passed or check.warning) and check.what in ("units", "sign", "columns") for check in checks):
         return Identification(KIND, device.label, tuple(checks))
     return _identification(device, checks, states)
@@ -163,10 +163,12 @@ def _measured_states(
     Raises   DeviceError  for words of the column wall that name no state
     """
     states, checks = list[_State](), list[Check]()
-    for name in _states(records, wall):
+    for name in _states_of_records(records, wall):
         report(f"spectra, {STATES[name]}", 0, 0)
         longest = max(longest_stretch(*one, name) for one in zip(records, samplings, strict=True))
-        state, check = _state(name, records, samplings, sums_segment_length(longest, segment), point, wall)
+        state, check = _measured_state(
+            name, records, samplings, sums_segment_length(longest, segment), point, wall
+        )
         checks.append(check)
         if state is not None:
             states.append(state)
@@ -185,7 +187,7 @@ def _identification(device: Device, checks: Sequence[Check], states: Sequence[_S
         validated_on=VALIDATED_ON
         if np.isfinite(share)
         else "nothing: no frequency is in both parts of the records",
-        remarks=tuple(sentence for state in states for sentence in _sentences(state)),
+        remarks=tuple(sentence for state in states for sentence in _passivity_remarks(state)),
         curves=_curves(states),
         details=_details(states),
     )
@@ -205,34 +207,37 @@ def _wall(device: Device, stiffness: float | None, damping: float | None) -> tup
     return wall
 
 
-def _states(records: Sequence[Record], wall: tuple[float, float] | None) -> list[str]:
-    """The states of the wall that the records are in. Raises DeviceError for other words."""
+def _states_of_records(records: Sequence[Record], wall: tuple[float, float] | None) -> list[str]:
+    """The states of the wall that the records are in. Raises DeviceError for other words.
+
+    wall  stiffness and damping; None: off in records without a column of it, else on
+    """
     seen = set[str]()
     for record in records:
         if "wall" not in record:
             seen.add("off" if wall is None else "on")
             continue
-        row = 0
+        row = 0  # of the piece's first
         for piece in record.pieces():
-            own = wall_states(piece["wall"])
-            if np.any(own == ""):
-                at = int(np.flatnonzero(own == "")[0])
-                raise record.fault(f"must be on or off, got {str(piece['wall'][at])[:60]!r}", row + at, "wall")
-            seen |= {str(state) for state in np.unique(own)}
-            row += len(own)
+            states = wall_states(piece["wall"])
+            if np.any(states == ""):
+                bad = int(np.flatnonzero(states == "")[0])
+                raise record.fault(f"must be on or off, got {str(piece['wall'][bad])[:60]!r}", row + bad, "wall")
+            seen |= {str(state) for state in np.unique(states)}
+            row += len(states)
     return [name for name in STATES if name in seen]
 
 
-def _names(record: Record) -> tuple[str, str]:
+def _signal_columns(record: Record) -> tuple[str, str]:
     """Columns of force and position of a record."""
     return next(n for n in FORCES if n in record), next(n for n in POSITIONS if n in record)
 
 
 def _check_signals(record: Record, sampling: SampleTimes) -> list[Check]:
     """Check that force and position change, the position by many of its steps, the force without a limit."""
-    force, position = _names(record)
+    force, position = _signal_columns(record)
     low, high = {force: np.inf, position: np.inf}, {force: -np.inf, position: -np.inf}
-    step, at_limit, total = np.inf, dict[float, int](), 0
+    step, at_limit, total = np.inf, dict[float, int](), 0  # at_limit: extreme force of a piece -> samples at it
     for piece in sampling.stretches(record):
         for name in (force, position):
             low[name] = min(low[name], float(np.min(piece[name])))
@@ -262,7 +267,7 @@ def _check_signals(record: Record, sampling: SampleTimes) -> list[Check]:
     return checks
 
 
-def _state(
+def _measured_state(
     name: str,
     records: Sequence[Record],
     samplings: Sequence[SampleTimes],
@@ -320,7 +325,7 @@ def _spectra_of_part(
     return merged_sums(
         [
             local_spectra(
-                stretches_of(record, sampling, _names(record), name, part),
+                stretches_of(record, sampling, _signal_columns(record), name, part),
                 sampling.period,
                 length,
                 (FORCE, POSITION),
@@ -334,7 +339,10 @@ def _predicted(
     name: str, point: OperatingPoint, wall: tuple[float, float] | None, frequency: Floats
 ) -> Complexes | None:
     """Impedance (k,) that `felt` predicts in a state of the wall [N s/m]; None where the device has no model or no
-    handle, or where the wall is not known."""
+    handle, or where the wall is not known.
+
+    wall  stiffness [N/m] and damping [N s/m]; None: not known
+    """
     from zwidth.errors import FeedbackError, HandleError
     from zwidth.measures.handle_impedance import felt_impedance, free_impedance
 
@@ -347,24 +355,28 @@ def _predicted(
         return None
 
 
-def _check_against(state: _State, wall: tuple[float, float] | None) -> list[Check]:
-    """Check that the measured impedance has the size and the sense of the predicted one."""
+def _check_against_prediction(state: _State, wall: tuple[float, float] | None) -> list[Check]:
+    """Check that the measured impedance has the size and the sense of the predicted one.
+
+    wall  stiffness [N/m] and damping [N s/m]; None: not known
+    """
     if state.predicted is None:
         text = (
             "no prediction to compare with; a device with a model, its handle, and the wall's stiffness give one"
         )
         return [Check("prediction", False, f"{STATES[state.name]}: {text}", warning=True)]
     Z, P = state.impedance.value, state.predicted
-    off = float(np.median(np.log10(np.abs(Z) / np.abs(P))))
+    # medians of powers of ten between measured and predicted impedance
+    size_off = float(np.median(np.log10(np.abs(Z) / np.abs(P))))
     w = 2.0 * np.pi * state.impedance.frequency
-    # force and position exchanged: Y in place of 1/Y
+    # with force and position exchanged Z = f/(jw x) becomes x/(jw f), of size 1/(w^2 |Z|)
     exchanged = float(np.median(np.log10(1.0 / (np.abs(Z) * w**2) / np.abs(P))))
-    size = f"{STATES[state.name]}: the impedance is {10.0**off:.3g} times the predicted one"
-    if THOUSAND[0] < -off < THOUSAND[1]:
+    size = f"{STATES[state.name]}: the impedance is {10.0**size_off:.3g} times the predicted one"
+    if THOUSAND[0] < -size_off < THOUSAND[1]:
         return [Check("units", False, f"{size}; the position looks like mm, or the force like kN; give m and N")]
-    if THOUSAND[0] < off < THOUSAND[1]:
+    if THOUSAND[0] < size_off < THOUSAND[1]:
         return [Check("units", False, f"{size}; the force looks like mN, or the position like km; give N and m")]
-    if abs(off) > FAR_OFF and abs(exchanged) < 0.5 * FAR_OFF:
+    if abs(size_off) > FAR_OFF and abs(exchanged) < 0.5 * FAR_OFF:
         return [Check("columns", False, f"{size}; force and position seem swapped; name them the other way")]
     sense = float(np.median(np.real(Z * np.conj(P)) / np.abs(Z * P)))
     if sense < OPPOSITE:
@@ -384,7 +396,10 @@ def _check_against(state: _State, wall: tuple[float, float] | None) -> list[Chec
 
 def _low_frequency_hint(state: _State, wall: tuple[float, float] | None) -> str:
     """What to look at where the measured impedance is far from the predicted one in the lowest octave; "" where it
-    is not: there a wall makes the difference."""
+    is not: there a wall makes the difference.
+
+    wall  stiffness [N/m] and damping [N s/m]; None: not known
+    """
     assert state.predicted is not None
     f = state.impedance.frequency
     lowest = f <= 2.0 * f[0]
@@ -407,20 +422,23 @@ def _decibels(Z: Complexes, P: Complexes) -> Floats:
 def _validation(states: Sequence[_State]) -> float:
     """Share of the unseen motion's power that the force explains through the response of the other part."""
     remains, total = 0.0, 0.0
-    for state in states:
+    for state in states:  # channels: 0 force, 1 position
         if not (state.first.segments and state.second.segments):
             continue
         if shared_power(state.first.power(0), state.second.power(0)) < LEAST_SHARED:
             continue
         response, _ = state.first.fit(0, 1)
         used = np.isin(state.second.frequency, state.impedance.frequency)
-        remains += float(np.sum(state.second.left_by(response)[used]))
+        remains += float(np.sum(state.second.squares_left_by(response)[used]))
         total += float(np.sum(state.second.power(1)[used])) * state.second.values
     return 1.0 - remains / total if total > 0.0 else float("nan")
 
 
 def _check_validation(share: float) -> list[Check]:
-    """Warn that the last third of the motion does not follow the force as the rest does; [] where it does."""
+    """Warn that the last third of the motion does not follow the force as the rest does; [] where it does.
+
+    share  of the unseen motion that is predicted; nan where none could be
+    """
     if share > PREDICTED:
         return []
     text = (
@@ -439,16 +457,16 @@ def _estimates(state: _State) -> list[Estimate]:
     estimates = []
     for what in ("lowest", "highest"):
         k, value, low, high = extreme(Z, lowest=what == "lowest")
-        its = f"{what} impedance, {name}, at {Z.frequency[k]:.4g} Hz"
-        estimates.append(Estimate(its, value, low, high, "N s/m"))
+        title_of_extreme = f"{what} impedance, {name}, at {Z.frequency[k]:.4g} Hz"
+        estimates.append(Estimate(title_of_extreme, value, low, high, "N s/m"))
     fit = low_frequency_fit(Z)
     if fit is not None:
-        for (title, unit), value, half in zip(LOW_FREQUENCY, *(part.tolist() for part in fit), strict=True):
-            estimates.append(Estimate(f"{title}, {name}", value, value - half, value + half, unit))
+        for (title, unit), value, half_width in zip(LOW_FREQUENCY, *(part.tolist() for part in fit), strict=True):
+            estimates.append(Estimate(f"{title}, {name}", value, value - half_width, value + half_width, unit))
     return estimates
 
 
-def _sentences(state: _State) -> list[str]:
+def _passivity_remarks(state: _State) -> list[str]:
     """Sentence that says whether the handle was seen to be passive, and in which octaves not."""
     bands, name = octave_bands(state.impedance), STATES[state.name]
     active = [f"{band.low:g} to {band.high:g} Hz" for band in bands if band.passive is False]
@@ -493,19 +511,20 @@ def _details(states: Sequence[_State]) -> dict[str, Any]:
         "segment_samples": {state.name: state.first.length for state in states},
         "estimator": "local polynomials; the band takes noise on either end, and holds each frequency with 95 %",
         "octaves": {name: [band.document() for band in some] for name, some in bands.items()},
-        "width_dB": _width(states),
+        "width_dB": _z_width(states),
     }
 
 
-def _width(states: Sequence[_State]) -> dict[str, float] | None:
-    """Ratio of the impedances with and without the wall, where both are known: the Z-width; None for one state."""
+def _z_width(states: Sequence[_State]) -> dict[str, float] | None:
+    """Ratio of the impedances with and without the wall, where both are known: the Z-width; None for one state, or
+    where no frequency is in both."""
     if len(states) < 2:
         return None
     on, off = (state.impedance for state in states)
-    both, i, j = np.intersect1d(on.frequency, off.frequency, return_indices=True)
+    both, on_rows, off_rows = np.intersect1d(on.frequency, off.frequency, return_indices=True)
     if not len(both):
         return None
-    ratio = _decibels(on.value[i], off.value[j])
+    ratio = _decibels(on.value[on_rows], off.value[off_rows])
     return {
         "median_dB": float(np.median(ratio)),
         "largest_dB": float(np.max(ratio)),

@@ -75,20 +75,22 @@ class LocalSpectra:
 
         The noise is taken to be that of `out`; any in `into` makes the response too small.
         """
-        a, b = slice(TERMS * into, TERMS * (into + 1)), TERMS * out
-        M, right = self.gram[:, a, a], self.gram[:, a, b]
-        size = np.sqrt(np.maximum(np.einsum("nii->ni", M).real, 1e-300))
-        scaled = M / (size[:, :, None] * size[:, None, :]) + 1e-12 * np.eye(TERMS)
+        # rows u, u r, u r^2 of one channel, and the value itself of the other
+        inputs, output = slice(TERMS * into, TERMS * (into + 1)), TERMS * out
+        normal, right = self.gram[:, inputs, inputs], self.gram[:, inputs, output]
+        size = np.sqrt(np.maximum(np.einsum("nii->ni", normal).real, 1e-300))
+        scaled = normal / (size[:, :, None] * size[:, None, :]) + 1e-12 * np.eye(TERMS)
         inverse = np.linalg.inv(scaled) / (size[:, :, None] * size[:, None, :])
         coefficients = np.einsum("nij,nj->ni", inverse, right)
-        left = self.gram[:, b, b].real - np.einsum("ni,ni->n", np.conj(right), coefficients).real
-        variance = np.maximum(left, 0.0) / max(self.freedom, 1) * inverse[:, 0, 0].real
+        remainder = self.gram[:, output, output].real - np.einsum("ni,ni->n", np.conj(right), coefficients).real
+        variance = np.maximum(remainder, 0.0) / max(self.freedom, 1) * inverse[:, 0, 0].real
         return np.asarray(coefficients), np.asarray(variance)
 
-    def left_by(self, coefficients: Complexes) -> Floats:
-        """Sum of squares (n,) of the position that a response (n, 3) from force to position leaves."""
+    def squares_left_by(self, coefficients: Complexes) -> Floats:
+        """Sum of squares (n,) of the position that a response (n, 3) from force to position, in powers of r,
+        leaves unexplained."""
         row = np.concatenate([-coefficients, np.ones((len(coefficients), 1))], axis=1)
-        gram = self.gram[:, : TERMS + 1, : TERMS + 1]
+        gram = self.gram[:, : TERMS + 1, : TERMS + 1]  # of u, u r, u r^2 and y
         return np.asarray(np.einsum("ni,nij,nj->n", np.conj(row), gram, row).real)
 
 
@@ -97,7 +99,7 @@ def _projections() -> Floats:
     """Matrix (9, 18) from the values u of a window to those that a segment keeps of u r^p, 6 for each power p."""
     r = np.arange(-HALF, HALF + 1) / HALF
     powers = r[:, None] ** np.arange(TERMS)
-    kept = np.linalg.qr(powers, mode="complete")[0][:, TERMS:]
+    kept = np.linalg.qr(powers, mode="complete")[0][:, TERMS:]  # orthogonal to polynomials, such as C
     return np.asarray((powers[:, :, None] * kept[:, None, :]).reshape(len(r), -1))
 
 
@@ -111,66 +113,67 @@ def correlations() -> Floats:
     r = np.arange(-HALF, HALF + 1) / HALF
     powers = r[:, None] ** np.arange(TERMS)
     q = np.linalg.qr(powers)[0]
-    P = np.eye(len(r)) - q @ q.T
-    M = powers.T @ (np.diag(P)[:, None] * powers)
+    P = np.eye(len(r)) - q @ q.T  # takes the polynomials out
+    M = powers.T @ (np.diag(P)[:, None] * powers)  # normal equations, in the mean
     A = (powers @ np.linalg.inv(M)[0])[:, None] * P
     n = len(r)
     shared = [float(np.sum(A[d:, d:] * A[: n - d, : n - d])) for d in range(0, n, STRIDE)]
     return np.array(shared) / shared[0]
 
 
-def neighbouring_lines() -> float:
-    """How many windows count as one independent one, in sums over many."""
+def windows_per_independent_one() -> float:
+    """How many of the windows, whose errors go together, count as one independent one in sums over many."""
     return float(2.0 * np.sum(correlations()) - 1.0)
 
 
 def local_spectra(stretches: Iterable[Piece], period: float, length: int, names: tuple[str, str]) -> LocalSpectra:
     """Sums over the segments of `length` samples that fit into pieces of a record, end to end, none across a gap.
 
-    stretches  pieces with a column "sample" that numbers the samples, as `Sampling.stretches` makes them
+    stretches  pieces with a column "sample" that numbers the samples, as `SampleTimes.stretches` makes them
     names      of the columns of force and position
     """
     count = max((length // 2 - 2 * HALF) // STRIDE, 0)
     middles = 1 + HALF + STRIDE * np.arange(count)
     gram: Complexes = np.zeros((count, 2 * TERMS, 2 * TERMS), dtype=np.complex128)
     segments = 0
-    kept = np.empty((2, 0))
+    samples = np.empty((2, 0))  # force and position that are in no segment yet
     for piece, goes_on in joined(stretches):
         values = np.array([piece[name] for name in names])
-        kept = np.concatenate([kept, values], axis=1) if goes_on else values
-        whole = (kept.shape[1] - DIFFERENCES) // length
+        samples = np.concatenate([samples, values], axis=1) if goes_on else values
+        complete = (samples.shape[1] - DIFFERENCES) // length
         several = max(1, BATCH // (2 * length))
-        for first in range(0, whole, several):
-            last = min(first + several, whole)
-            _add(gram, kept[:, first * length : last * length + DIFFERENCES], length)
-        segments += max(whole, 0)
-        kept = kept[:, max(whole, 0) * length :]
+        for first in range(0, complete, several):
+            last = min(first + several, complete)
+            _add_products(gram, samples[:, first * length : last * length + DIFFERENCES], length)
+        segments += max(complete, 0)
+        samples = samples[:, max(complete, 0) * length :]
     return LocalSpectra(middles / (length * period), gram, period, length, segments)
 
 
-def _add(gram: Complexes, values: Floats, length: int) -> None:
+def _add_products(gram: Complexes, values: Floats, length: int) -> None:
     """Add to `LocalSpectra.gram` the products of segments end to end, force and position (2, count length + 2)."""
     from scipy.fft import rfft
 
     force = values[0, :-DIFFERENCES].reshape(-1, length)
     position = np.diff(values[1], n=DIFFERENCES).reshape(-1, length)
     U, Y = rfft(force, axis=1), rfft(position, axis=1)
-    turn = _projections().astype(complex)
+    projections = _projections().astype(complex)
     for first in range(0, len(gram), WINDOWS):
         count = min(WINDOWS, len(gram) - first)
         start = 1 + STRIDE * first
         span = slice(start, start + STRIDE * (count - 1) + 2 * HALF + 1)
         for u, y in zip(U[:, span], Y[:, span], strict=True):
-            both = [_kept(one, turn) for one in (u, y)]
-            rows = np.concatenate(both, axis=1)
+            kept_values = [_kept_values(one, projections) for one in (u, y)]
+            rows = np.concatenate(kept_values, axis=1)
             gram[first : first + count] += np.conj(rows) @ np.swapaxes(rows, 1, 2)
 
 
-def _kept(values: Complexes, turn: Complexes) -> Complexes:
-    """What a segment keeps (n, 3, 6) of its windows, 6 values for each power of r; turn: `_projections`."""
+def _kept_values(values: Complexes, projections: Complexes) -> Complexes:
+    """What a segment keeps (n, 3, 6) of its windows, 6 values for each power of r, by the matrix
+    `_projections`."""
     # copied: a product with overlapping rows is ten times slower
     windows = np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(values, 2 * HALF + 1)[::STRIDE])
-    return np.asarray((windows @ turn).reshape(-1, TERMS, KEPT))
+    return np.asarray((windows @ projections).reshape(-1, TERMS, KEPT))
 
 
 def sums_segment_length(samples: int, segment: int | None = None) -> int:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Complexes, Flags, Floats
-from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbouring_lines
+from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, windows_per_independent_one
 from zwidth.identify.profile_likelihood import LEVEL
 from zwidth.identify.records.record import Piece, Record
 from zwidth.identify.records.sampling import SampleTimes, joined
@@ -98,15 +98,15 @@ def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, leve
     from scipy.stats import f as fisher
 
     shift = np.minimum(bias / np.maximum(deviation, 1e-300), FAR)
-    known = np.interp(shift, *_shifted(level, size))
-    # the deviation is itself estimated
+    reached = np.interp(shift, *_shifts_and_half_widths(level, size))
+    # the deviation is itself estimated: Fisher's quantile in place of chi-square's
     wider = np.sqrt(size * fisher.ppf(level, size, 2.0 * max(freedom, 0.5)) / chi2.ppf(level, size))
-    far = np.maximum(bias - shift * deviation, 0.0)
-    return np.asarray(deviation * (shift + (known - shift) * wider) + far)
+    beyond = np.maximum(bias - shift * deviation, 0.0)
+    return np.asarray(deviation * (shift + (reached - shift) * wider) + beyond)
 
 
 @lru_cache(maxsize=256)
-def _shifted(level: float, size: int) -> tuple[Floats, Floats]:
+def _shifts_and_half_widths(level: float, size: int) -> tuple[Floats, Floats]:
     """Shifts (m,) from 0 to `FAR`, and the size (m,) that an error of deviation 1 in each of `size` components
     about each of them stays within, with a level."""
     from scipy.special import chndtrix
@@ -120,27 +120,28 @@ def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedan
     from scipy.stats import f as fisher
 
     (direct, variance), (inverse, _) = spectra.fit(0, 1), spectra.fit(1, 0)
-    H1, back = direct[:, 0], inverse[:, 0]
+    H1, H_inverse = direct[:, 0], inverse[:, 0]
     # so that no frequency of all passes by chance, with 95 %
     chance = fisher.isf((1.0 - LEVEL) / max(len(H1), 1), 2.0, 2.0 * max(spectra.freedom, 1))
     power = spectra.power(0)
     seen = (2.0 * np.abs(H1) ** 2 > 2.0 * chance * variance) & (spectra.frequency < highest)
-    seen &= (power > SILENT * np.max(power, initial=0.0)) & (np.abs(back) > 0.0)
-    H1, back, variance, f = H1[seen], back[seen], variance[seen], spectra.frequency[seen]
-    # of the values some were fitted
-    left = np.maximum(1.0 - np.abs(H1 * back), 0.0) * spectra.values / max(spectra.freedom, 1)
-    coherence = np.maximum(1.0 - left, LEAST)
+    seen &= (power > SILENT * np.max(power, initial=0.0)) & (np.abs(H_inverse) > 0.0)
+    H1, H_inverse, variance, f = H1[seen], H_inverse[seen], variance[seen], spectra.frequency[seen]
+    # coherence is |H1 / H2|, 1 / H2 the fit of force on position, and less for the values that were fitted
+    unexplained = np.maximum(1.0 - np.abs(H1 * H_inverse), 0.0) * spectra.values / max(spectra.freedom, 1)
+    coherence = np.maximum(1.0 - unexplained, LEAST)
     G = H1 / np.sqrt(coherence)
     value = spectra.differencing[seen] / (2j * np.pi * f * G)
-    size = np.abs(value)
+    magnitude = np.abs(value)
     # where only the position is noisy |Z| is larger by this, with its error
-    far = 1.0 / np.sqrt(coherence)
-    deviation = size * far * np.sqrt(0.5 * variance) / np.abs(H1)
-    return MeasuredImpedance(f, value, coherence, deviation, size * (far - 1.0), float(spectra.freedom))
+    to_either = 1.0 / np.sqrt(coherence)
+    deviation = magnitude * to_either * np.sqrt(0.5 * variance) / np.abs(H1)
+    return MeasuredImpedance(f, value, coherence, deviation, magnitude * (to_either - 1.0), float(spectra.freedom))
 
 
 def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, float, float]:
-    """The lowest or highest |Z| of all frequencies: where, the value, and its interval (95 %) [N s/m].
+    """The lowest or highest |Z| of all frequencies: index of its frequency, the value, and both ends of its
+    interval (95 %) [N s/m].
 
     Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of the end towards the
     others is raised by the number of independent ones among those whose bands reach the extreme one. The other
@@ -149,7 +150,7 @@ def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, 
     size = np.abs(impedance.value)
     k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
     rivals = impedance.low <= impedance.high[k] if lowest else impedance.high >= impedance.low[k]
-    count = max(float(np.sum(rivals)) / neighbouring_lines(), 1.0)
+    count = max(float(np.sum(rivals)) / windows_per_independent_one(), 1.0)
     level = 1.0 - (1.0 - LEVEL) * min(count, 2.0) / count
     some = impedance.only(rivals)
     raised, plain = some.half_width(level), some.half_width()
@@ -186,7 +187,7 @@ def longest_stretch(record: Record, sampling: SampleTimes, state: str) -> int:
     if "wall" not in record:
         return sampling.longest
     longest = count = 0
-    names = (record.names[0], record.names[0])
+    names = (record.names[0], record.names[0])  # any columns: samples are counted
     for piece, goes_on in joined(stretches_of(record, sampling, names, state, (0.0, 1.0))):
         count = len(piece["sample"]) + (count if goes_on else 0)
         longest = max(longest, count)
@@ -244,13 +245,13 @@ def _deviation_of_mean(impedance: MeasuredImpedance) -> float:
 
     The error of Z is -Z/G times that of G, whose windows overlap (`correlations`).
     """
-    turned = impedance.deviation * (impedance.value / np.abs(impedance.value)) ** 2
+    error = impedance.deviation * (impedance.value / np.abs(impedance.value)) ** 2
     f, rho = impedance.frequency, correlations()
     spacing = np.min(np.diff(f)) if len(f) > 1 else 1.0
     place = np.round(f / spacing).astype(int)
-    total = float(np.sum(np.abs(turned) ** 2))
+    total = float(np.sum(np.abs(error) ** 2))
     for apart in range(1, len(rho)):
-        a, b = turned[:-apart], turned[apart:]
+        a, b = error[:-apart], error[apart:]
         distance = place[apart:] - place[:-apart]
         near = np.where(distance < len(rho), rho[np.minimum(distance, len(rho) - 1)], 0.0)
         total += 2.0 * float(np.sum(near * np.real(a * np.conj(b))))
@@ -270,30 +271,37 @@ def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | N
     w = 2.0 * np.pi * impedance.frequency
     A = np.column_stack([(1j * w) ** power for power in range(-1, 5)])
     sigma = impedance.deviation + 1e-9 * np.abs(impedance.value)
-    # noise on either end scales all of Z
-    scaled = impedance.value * impedance.bias / np.abs(impedance.value)
+    # noise on either end scales all of Z: what that changes of it, fitted along with it
+    by_bias = impedance.value * impedance.bias / np.abs(impedance.value)
+    # of each fit its highest frequency, then of K, B and m: values, deviations, and biases
     fits = list[tuple[float, Floats, Floats, Floats]]()
     count = FEWEST_LINES
     while count <= len(w):
         some = slice(0, count)
         weight = np.tile(1.0 / sigma[some], 2)
         rows = np.vstack([A[some].real, A[some].imag]) * weight[:, None]
-        both_values = np.column_stack([impedance.value[some], scaled[some]])
-        right = np.concatenate([both_values.real, both_values.imag]) * weight[:, None]
+        values_and_bias = np.column_stack([impedance.value[some], by_bias[some]])
+        right = np.concatenate([values_and_bias.real, values_and_bias.imag]) * weight[:, None]
         size = np.linalg.norm(rows, axis=0)
-        both, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
-        solved, shift = (both / size[:, None])[:KEPT_POWERS].T
-        freedom = max((2 * count - rows.shape[1]) / neighbouring_lines(), 1.0)
-        remains = float(np.sum((rows / size @ both[:, 0] - right[:, 0]) ** 2)) / neighbouring_lines() / freedom
-        if remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):
+        coefficients, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
+        solved, bias = (coefficients / size[:, None])[:KEPT_POWERS].T
+        freedom = max((2 * count - rows.shape[1]) / windows_per_independent_one(), 1.0)
+        remains = (
+            float(np.sum((rows / size @ coefficients[:, 0] - right[:, 0]) ** 2))
+            / windows_per_independent_one()
+            / freedom
+        )
+        if remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):  # three standard deviations above what scatter leaves
             break
-        variance = np.diag(np.linalg.inv((rows / size).T @ (rows / size))) / size**2 * neighbouring_lines()
+        variance = (
+            np.diag(np.linalg.inv((rows / size).T @ (rows / size))) / size**2 * windows_per_independent_one()
+        )
         deviation = np.sqrt(variance[:KEPT_POWERS] * max(remains, 1.0))
-        fits.append((float(impedance.frequency[count - 1]), solved, deviation, np.abs(shift)))
+        fits.append((float(impedance.frequency[count - 1]), solved, deviation, np.abs(bias)))
         count = max(count + 1, int(1.2 * count))
     if not fits:
         return None
     # what is left out grows steeply with frequency: it is scatter's size at the last, and small at 0.45 of it
     highest = BACK * fits[-1][0]
-    _, numbers, deviation, shift = next(fit for fit in reversed(fits) if fit[0] <= highest or fit is fits[0])
-    return numbers, _half_width(deviation, shift, impedance.freedom, 1)
+    _, numbers, deviation, bias = next(fit for fit in reversed(fits) if fit[0] <= highest or fit is fits[0])
+    return numbers, _half_width(deviation, bias, impedance.freedom, 1)

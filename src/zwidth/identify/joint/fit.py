@@ -15,10 +15,11 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
+from zwidth.identify.joint.motion import MASS as MASS
+from zwidth.identify.joint.motion import STIFFNESS as STIFFNESS
 from zwidth.identify.joint.motion import follow_windows
 from zwidth.identify.profile_likelihood import LEVEL
 
-MASS, STIFFNESS = 0, 5  # indices among the numbers
 DELAY: Final = 6  # index of the force's delay behind the six numbers of the motion
 DRIFTS: Final = (7, 8, 9)  # indices of the bias's drift: even, bent and S-shaped
 COUNT: Final = 10  # numbers
@@ -68,7 +69,7 @@ class Windows:
     def cut(self, parts: int) -> Windows:
         """Each window cut into so many parts, one behind the other; fewer where a part had less than 8 samples."""
         edges = [np.linspace(0, n, min(parts, max(n // 8, 1)) + 1).astype(np.int64) for n in self.length]
-        many = np.array([len(e) - 1 for e in edges])
+        many = np.array([len(e) - 1 for e in edges])  # parts of each window
         offsets = np.concatenate([e[:-1] for e in edges])
         return replace(
             self,
@@ -187,34 +188,35 @@ class JointFit:
         return float(np.sum(self.residuals**2))
 
     def combination(self, weights: Floats) -> tuple[float, float, float]:
-        """Value of a sum over the numbers, weights (10,), its standard error, and the freedom of that.
+        """Value of a sum over the numbers, weights (10,), its standard error, and the degrees of freedom of that;
+        an error of inf with 1 where the data do not tell it.
 
         The degrees of freedom of Student's distribution follow by Satterthwaite's rule from the variances and
         covariances that the blocks' changes would have if the residuals were independent (Bell and McCaffrey 2002,
         known at second hand).
         """
-        c = np.asarray(weights, dtype=float).copy()
-        value = float(c @ self.numbers.values)
+        by_free = np.asarray(weights, dtype=float).copy()
+        value = float(by_free @ self.numbers.values)
         for number, other in self.numbers.tied:
-            c[other] += c[number]
-        c = c[list(self.numbers.free)]
-        known = c != 0.0
+            by_free[other] += by_free[number]
+        by_free = by_free[list(self.numbers.free)]
+        known = by_free != 0.0
         if np.any(~np.isfinite(np.diag(self.covariance)[known])):
             return value, np.inf, 1.0
-        spread = np.einsum("i,gihj,j->gh", c, self.weights, c)
-        expected = float(np.trace(spread))
-        if not expected > LEAST_SHARE * float(c @ self.working @ c):
+        covariances = np.einsum("i,gihj,j->gh", by_free, self.weights, by_free)
+        expected = float(np.trace(covariances))
+        if not expected > LEAST_SHARE * float(by_free @ self.working @ by_free):
             return value, np.inf, 1.0
-        error = float(np.sqrt(np.sum((self.changes @ c) ** 2)))
-        return value, error, max(expected**2 / float(np.sum(spread**2)), 1.0)
+        error = float(np.sqrt(np.sum((self.changes @ by_free) ** 2)))
+        return value, error, max(expected**2 / float(np.sum(covariances**2)), 1.0)
 
     def interval(self, weights: Floats) -> tuple[float, float, float]:
         """Value and ends of the interval of a sum over the numbers, weights (10,)."""
         from scipy.stats import t
 
         value, error, freedom = self.combination(weights)
-        half = error * float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) if np.isfinite(error) else np.inf
-        return value, value - half, value + half
+        half_width = error * float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) if np.isfinite(error) else np.inf
+        return value, value - half_width, value + half_width
 
 
 class _Search:
@@ -229,17 +231,17 @@ class _Search:
         self.of_window = np.searchsorted(windows.first, self.cut.first, side="right") - 1
         self.reading = windows.position[windows.rows]
         self.where = np.repeat(np.arange(len(windows.first)), windows.length)
-        self.edges = np.concatenate([[0], np.cumsum(self.cut.length)])
+        self.edges = np.concatenate([[0], np.cumsum(self.cut.length)])  # of the blocks among all samples
         self.scales = scales(windows)
 
     def linearised(self) -> tuple[Blocks, Floats]:
         """Sums over the blocks at the present numbers, and what these leave of the readings (n,)."""
-        p = len(self.numbers.free)
+        p = len(self.numbers.free)  # columns: the free numbers, position and velocity of the window's start
         base = predict(self.windows, self.numbers.values, self.starts)
         columns = np.empty((len(base), p + 2))
-        x = self.numbers.free_values
+        values = self.numbers.free_values
         for i, number in enumerate(self.numbers.free):
-            moved = x.copy()
+            moved = values.copy()
             step = STEP * self.scales[number]
             moved[i] += step
             columns[:, i] = (
@@ -250,8 +252,8 @@ class _Search:
             step = STEP * self.scales[COUNT + j]
             starts[:, j] += step
             columns[:, p + j] = (predict(self.windows, self.numbers.values, starts) - base) / step
-        left = self.reading - base
-        pairs = [(columns[a:b], left[a:b]) for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
+        remainder = self.reading - base
+        pairs = [(columns[a:b], remainder[a:b]) for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
         return (
             Blocks(
                 np.array([A.T @ A for A, _ in pairs]),
@@ -259,7 +261,7 @@ class _Search:
                 np.array([float(r @ r) for _, r in pairs]),
                 self.of_window,
             ),
-            left,
+            remainder,
         )
 
     def run(self, most: int = MOST_STEPS) -> tuple[Blocks, Floats, bool]:
@@ -269,25 +271,25 @@ class _Search:
         """
         ridge = 1
         for _ in range(most):
-            blocks, left = self.linearised()
-            least = float(left @ left)
+            blocks, remainder = self.linearised()
+            least = float(remainder @ remainder)
             arrow = Arrow.of(blocks, len(self.starts))
-            for tried in range(max(ridge - 1, 0), len(RIDGES)):
+            for tried in range(max(ridge - 1, 0), len(RIDGES)):  # from one below that of the last step on
                 ridge = tried
                 numbers, starts, squares = self._best_step(*arrow.solved(RIDGES[ridge], self.floor))
                 if squares < least:
                     break
-            else:
-                return blocks, left, True
+            else:  # no ridge leads down
+                return blocks, remainder, True
             self.numbers, self.starts = numbers, starts
             if least - squares <= ARRIVED * least:
-                blocks, left = self.linearised()
-                return blocks, left, True
+                blocks, remainder = self.linearised()
+                return blocks, remainder, True
         return *self.linearised(), False
 
     def _best_step(self, step: Floats, along: Floats) -> tuple[JointNumbers, Floats, float]:
-        """The numbers a step (p,) further; each window's start as far along its step, (W, 2), as predicts it best;
-        and the sum of squares there."""
+        """The numbers a step (p,) further; each window's start (W, 2) by that of `SHARES` of its step, `along`
+        (W, 2), that predicts it best; and the sum of squares there."""
         numbers = self._moved(step)
         guesses = [self.starts + share * along for share in SHARES]
         squares = np.array([squares_of(self.windows, numbers, guess) for guess in guesses])
@@ -297,10 +299,12 @@ class _Search:
 
     @property
     def floor(self) -> Floats:
-        """Least squares (2,) of the derivatives by a window's start: starts of windows in which nothing moves
-        change nothing, and must not run away."""
+        """Least diagonal (2,) of the normal equations of a window's start, position and velocity: starts of
+        windows in which nothing moves change nothing, and must not run away.
+        """
         samples = float(np.mean(self.windows.length))
         span = samples * float(np.mean(self.windows.period))
+        # a thousandth of what a start changes in a window that moves freely: all samples, by 1 and by the time
         return 1e-3 * samples * np.array([1.0, span**2])
 
     def _moved(self, step: Floats) -> JointNumbers:
@@ -333,10 +337,11 @@ def scales(windows: Windows) -> Floats:
         float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300
     )
     length = float(np.mean(windows.length)) * T
-    v = x / (0.25 * length)
+    v = x / (0.25 * length)  # of a motion that goes over its range in a quarter of a window
     a = v / (0.25 * length)
     f = float(np.std(windows.force)) if windows.driven else a
-    f = f if f > 0.0 else a
+    f = f if f > 0.0 else a  # of free motion all numbers are over the mass
+    # m, b and F forward and backward, k, delay, three drifts; position and velocity of a start
     return np.array([f / a, f / v, f / v, f, f, f / x, T, f, f, f, x, v])
 
 
@@ -344,8 +349,8 @@ def assembled_windows(blocks: Blocks, count: int) -> Floats:
     """Normal matrix (p + 2 W, p + 2 W) of the free numbers and of the starts of all windows, `count` W."""
     p = blocks.gram.shape[-1] - 2
     whole = np.zeros((p + 2 * count, p + 2 * count))
-    for gram, w in zip(blocks.gram, blocks.window, strict=True):
-        at = np.append(np.arange(p), [p + 2 * w, p + 2 * w + 1])
+    for gram, window in zip(blocks.gram, blocks.window, strict=True):
+        at = np.append(np.arange(p), [p + 2 * window, p + 2 * window + 1])
         whole[np.ix_(at, at)] += gram
     return whole
 
@@ -379,28 +384,30 @@ class Arrow:
     def solved(self, ridge: float, floor: Floats) -> tuple[Floats, Floats]:
         """Steps (p,) of the numbers and (W, 2) of the starts: (N + ridge diag N)^-1 g.
 
+        The starts are eliminated, window by window, and found behind the numbers.
         floor  (2,) least diagonal of the starts, of which the ridge is a share
         """
-        own = np.sqrt(np.maximum(np.diag(self.own), 1e-300))
-        size = np.sqrt(np.maximum(np.diagonal(self.starts, axis1=1, axis2=2), floor))
-        more = 1.0 + ridge + 1e-12
-        N = self.own / np.outer(own, own) + (more - 1.0) * np.eye(len(own))
-        starts = self.starts / (size[:, :, None] * size[:, None, :]) + (more - 1.0) * np.eye(2)
-        mixed = self.mixed / (own[:, None] * size[:, None, :])
-        back = np.linalg.solve(starts, np.swapaxes(mixed, 1, 2))  # (W, 2, p)
-        rest = np.linalg.solve(starts, (self.slopes / size)[:, :, None])[:, :, 0]
-        inner = N - np.einsum("wpi,wiq->pq", mixed, back)
-        slope = self.slope / own - np.einsum("wpi,wi->p", mixed, rest)
-        x = np.linalg.lstsq(inner, slope, rcond=1e-12)[0] if len(slope) else slope
-        return x / own, (rest - back @ x) / size
+        number_size = np.sqrt(np.maximum(np.diag(self.own), 1e-300))
+        start_size = np.sqrt(np.maximum(np.diagonal(self.starts, axis1=1, axis2=2), floor))
+        diagonal = 1.0 + ridge + 1e-12
+        N = self.own / np.outer(number_size, number_size) + (diagonal - 1.0) * np.eye(len(number_size))
+        starts = self.starts / (start_size[:, :, None] * start_size[:, None, :]) + (diagonal - 1.0) * np.eye(2)
+        mixed = self.mixed / (number_size[:, None] * start_size[:, None, :])
+        per_number = np.linalg.solve(starts, np.swapaxes(mixed, 1, 2))  # (W, 2, p)
+        starts_alone = np.linalg.solve(starts, (self.slopes / start_size)[:, :, None])[:, :, 0]
+        eliminated = N - np.einsum("wpi,wiq->pq", mixed, per_number)
+        slope = self.slope / number_size - np.einsum("wpi,wi->p", mixed, starts_alone)
+        x = np.linalg.lstsq(eliminated, slope, rcond=1e-12)[0] if len(slope) else slope
+        return x / number_size, (starts_alone - per_number @ x) / start_size
 
 
 def squares_of(windows: Windows, numbers: JointNumbers, starts: Floats) -> Floats:
-    """Sum of squares (W,) of what the numbers leave in each window; inf where the prediction runs away."""
+    """Sum of squares (W,) of what the numbers, and starts (W, 2), leave in each window; inf where the prediction
+    runs away."""
     edges = np.cumsum(windows.length) - windows.length
     with np.errstate(over="ignore", invalid="ignore"):
-        left = windows.position[windows.rows] - predict(windows, numbers.values, starts)
-        sums = np.add.reduceat(left**2, edges)
+        remainder = windows.position[windows.rows] - predict(windows, numbers.values, starts)
+        sums = np.add.reduceat(remainder**2, edges)
     return np.where(np.isfinite(sums), sums, np.inf)
 
 
@@ -411,9 +418,9 @@ def explained(windows: Windows, squares: Floats) -> float:
     """
     total = 0.0
     for first, length in zip(windows.first, windows.length, strict=True):
-        y, t = windows.position[first : first + length], np.arange(length) - 0.5 * (length - 1)
+        y, samples = windows.position[first : first + length], np.arange(length) - 0.5 * (length - 1)
         y = y - np.mean(y)
-        total += float(y @ y - (y @ t) ** 2 / (t @ t))
+        total += float(y @ y - (y @ samples) ** 2 / (samples @ samples))
     return 1.0 - float(np.sum(squares)) / max(total, 1e-300)
 
 
@@ -427,7 +434,12 @@ def approach(
 
 
 def fit_joint(windows: Windows, numbers: JointNumbers, starts: Floats, *, blocks: int = BLOCKS) -> JointFit:
-    """The free numbers that predict the motion in the windows best, from a guess close to them."""
+    """The free numbers that predict the motion in the windows best, from a guess close to them.
+
+    numbers, starts  the guess, with which of the numbers are free; and position and velocity (W, 2) at each
+                     window's start
+    blocks           least number of blocks of samples, whose spread makes the intervals
+    """
     search = _Search(windows, numbers, starts, blocks)
     sums, left, converged = search.run()
     spread = block_spread(sums, len(search.starts), len(search.numbers.free))
@@ -450,17 +462,19 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     inverse, lost = _inverse(whole / np.outer(size, size))
     G = len(blocks.window)
+    # of each block: where the free numbers and its window's start stand in the whole matrix
     columns = np.concatenate(
         [np.tile(np.arange(free), (G, 1)), free + 2 * blocks.window[:, None] + [0, 1]], axis=1
     )
     scale = size[columns]
     S = blocks.gram / (scale[:, :, None] * scale[:, None, :])
     grown = _enlarged(S, inverse[columns[:, :, None], columns[:, None, :]])
-    to = inverse[:free][:, columns].transpose(1, 0, 2) @ grown  # (G, p, q)
+    to = inverse[:free][:, columns].transpose(1, 0, 2) @ grown  # (G, p, q), N^-1 (1 - S P)^-1/2
     changes = np.einsum("gpq,gq->gp", to, blocks.gradient / scale) / size[:free]
     covariance = changes.T @ changes
     for i in np.flatnonzero(lost[:free]):
         covariance[i, i] = np.inf
+    # weights: of residuals that are independent but for what the fit has taken from all of them
     rows = np.zeros((G, free, len(whole)))
     taken = to @ S
     np.put_along_axis(rows, np.broadcast_to(columns[:, None, :], taken.shape), taken, axis=2)
@@ -476,8 +490,8 @@ def _enlarged(S: Floats, P: Floats) -> Floats:
     values, vectors = np.linalg.eigh(P)
     root = np.sqrt(np.maximum(values, 0.0))
     R = (vectors * root[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-    back = np.divide(1.0, root, out=np.zeros_like(root), where=root > 1e-9 * np.max(root))
-    inverse_root = (vectors * back[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    inverse_values = np.divide(1.0, root, out=np.zeros_like(root), where=root > 1e-9 * np.max(root))
+    inverse_root = (vectors * inverse_values[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     leverage, axes = np.linalg.eigh(R @ S @ R)
     # a direction that one block alone determines leaves no residual there to be enlarged
     factor = np.where(leverage < 1.0 - LEVERAGE, 1.0 / np.sqrt(np.maximum(1.0 - leverage, LEVERAGE)), 1.0)
@@ -487,7 +501,7 @@ def _enlarged(S: Floats, P: Floats) -> Floats:
 def _inverse(scaled: Floats) -> tuple[Floats, Flags]:
     """Inverse of a normal matrix (q, q) with diagonal 1, and which parameters (q,) it leaves undetermined."""
     values, vectors = np.linalg.eigh(scaled)
-    felt = values > 1e-11
+    felt = values > 1e-11  # directions that change the prediction by more than rounding
     inverse = (vectors[:, felt] / values[felt]) @ vectors[:, felt].T
     lost = np.any(np.abs(vectors[:, ~felt]) > 1e-3, axis=1)
     return inverse, lost

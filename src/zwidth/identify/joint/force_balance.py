@@ -28,6 +28,7 @@ from zwidth.device.faults import comma_list, plural
 from zwidth.identify.identification import Check
 from zwidth.identify.joint.fit import COUNT, MASS, ONE, STIFFNESS, JointNumbers, Windows, explained, squares_of
 from zwidth.identify.joint.joint import Joint
+from zwidth.identify.joint.motion import DRY_BACKWARD, DRY_FORWARD, VISCOUS_BACKWARD, VISCOUS_FORWARD
 from zwidth.identify.joint.record import JointMotion
 from zwidth.identify.joint.start import MOVING, PARTLY, SHORTEST, force_balance_rows, search_guess, weighting
 from zwidth.identify.profile_likelihood import LEVEL
@@ -37,7 +38,7 @@ BY_CHANCE: Final = 5e-4  # probability that noise alone passes for a mass: a lar
 OVERLAP: Final = 2.0  # rows that share each sample: so many fewer of them are independent
 MEMORY: Final = 0.1  # share of the rows over which errors may go together: with less, slow noise seems to be none
 FEWEST_FREE: Final = 3.0  # degrees of freedom below which a variance says little
-NUMBERS: Final = (MASS, 1, 3, 4, STIFFNESS)  # indices of the numbers m, b, F_f, F_b and k, columns of a balance
+NUMBERS: Final = (MASS, VISCOUS_FORWARD, DRY_FORWARD, DRY_BACKWARD, STIFFNESS)  # columns of a balance
 TINY: Final = 1e-9  # share of the largest column below which one is rounding
 
 
@@ -72,7 +73,7 @@ class ForceBalance:
 
     @property
     def against_mass(self) -> bool:
-        """Whether it falls with the acceleration, as it does for no mass."""
+        """Whether the force falls with the acceleration beyond its own noise, as it does for no mass."""
         return self.mass_over_error < -self.critical
 
     def interval(self, weights: Floats) -> tuple[float, float]:
@@ -99,9 +100,9 @@ def force_balance(windows: Windows, resolution: float, *, delay: float = 0.0, sp
     sizes = [SHORTEST]
     while 2 * sizes[-1] <= np.max(windows.length):
         sizes.append(2 * sizes[-1])
-    chances = [(size, moving) for size in sizes for moving in (MOVING, PARTLY)]
-    level = BY_CHANCE / len(chances)
-    tried = [_balanced(windows, size, resolution, late, spring, moving, level) for size, moving in chances]
+    choices = [(size, moving) for size in sizes for moving in (MOVING, PARTLY)]
+    level = BY_CHANCE / len(choices)
+    tried = [_balance_over(windows, size, resolution, late, spring, moving, level) for size, moving in choices]
     found = [one for one in tried if one is not None]
     if not found:
         return NOTHING
@@ -109,12 +110,13 @@ def force_balance(windows: Windows, resolution: float, *, delay: float = 0.0, sp
     return replace(best, depends=any(one.depends or one.tells_mass or one.against_mass for one in found))
 
 
-def _balanced(
+def _balance_over(
     windows: Windows, size: int, resolution: float, late: int, spring: bool, moving: float, level: float
 ) -> ForceBalance | None:
-    """The balance over segments of so many samples; None of too few.
+    """The balance over segments of `size` samples; None of too few segments.
 
-    late    delay of the force [samples];   moving  share of a segment that must be motion
+    late    delay of the force [samples];   resolution, spring  as in `force_balance`;   moving  share of a
+            segment that must be motion
     level   probability with which noise alone passes for a mass, or for a force that depends on the motion
     """
     from scipy.stats import f as f_distribution
@@ -123,48 +125,54 @@ def _balanced(
     if size > np.max(windows.length):
         return None
     weight, slope, _ = weighting(size)
-    A, at, T = force_balance_rows(windows, size, resolution, moving)
+    columns, samples, T = force_balance_rows(windows, size, resolution, moving)
     forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
-    held = forces[np.clip(at - late, 0, len(forces) - 1)]
+    held = forces[np.clip(samples - late, 0, len(forces) - 1)]
     force, rate = held @ weight, (held @ slope) / T
     # what tells nothing of the joint: a constant force, one that is late, one that drifts
     beside = np.stack(
-        [np.full(len(force), np.sum(weight)), rate, *(d[at] @ weight for d in windows.drifts)], axis=1
+        [np.full(len(force), np.sum(weight)), rate, *(d[samples] @ weight for d in windows.drifts)], axis=1
     )
-    motion = A[:, : len(NUMBERS) if spring else -1]
-    inverse, left, rank = _least_squares(np.concatenate([motion, beside[:, 1:]], axis=1), force)
+    motion = columns[:, : len(NUMBERS) if spring else -1]  # the last column is the spring's
+    inverse, remains, rank = _least_squares(np.concatenate([motion, beside[:, 1:]], axis=1), force)
     freedom = len(force) / OVERLAP - rank
     if freedom < FEWEST_FREE:
         return None
-    # while the joint stands partly, a constant force is none of the levels
+    # F test of the motion's columns; while the joint stands partly, a constant force is none of the levels
     _, left_with, rank_with = _least_squares(np.concatenate([motion, beside], axis=1), force)
     _, left_without, rank_without = _least_squares(beside, force)
-    more, squares = rank_with - rank_without, float(left_with @ left_with)
-    gain = float(left_without @ left_without) - squares
-    depends = more > 0 and gain * freedom > more * f_distribution.ppf(1.0 - level, more, freedom) * squares
+    added, squares_with = rank_with - rank_without, float(left_with @ left_with)
+    gain = float(left_without @ left_without) - squares_with
+    depends = added > 0 and gain * freedom > added * f_distribution.ppf(1.0 - level, added, freedom) * squares_with
     numbers = list(NUMBERS[: motion.shape[1]])
     values, covariance = np.zeros(COUNT), np.zeros((COUNT, COUNT))
     values[numbers] = (inverse @ force)[: len(numbers)]
-    covariance[np.ix_(numbers, numbers)] = _spread(inverse[: len(numbers)], left, freedom)
-    for one, other in _alike(motion):
+    covariance[np.ix_(numbers, numbers)] = _covariance(inverse[: len(numbers)], remains, freedom)
+    for one, other in _tied_numbers(motion):
         values[one] = values[other]
         covariance[one] = covariance[other]
         covariance[:, one] = covariance[:, other]
     return ForceBalance(values, covariance, freedom, float(t.ppf(1.0 - level, freedom)), bool(depends))
 
 
-def _alike(motion: Floats) -> list[tuple[int, int]]:
-    """(index, other) of numbers that follow another: viscous friction backward, and dry friction of a direction in
-    which nothing slid. motion (s, c): columns of `NUMBERS`."""
-    pairs = [(2, 1)]
-    forward, backward = np.any(motion[:, 2] != 0.0), np.any(motion[:, 3] != 0.0)
-    return pairs + ([(4, 3)] if not backward else [] if forward else [(3, 4)])
+def _tied_numbers(motion: Floats) -> list[tuple[int, int]]:
+    """(index, other) of numbers that are set to another: viscous friction backward, and dry friction of a
+    direction in which nothing slid.
+
+    motion  (s, c) columns of `NUMBERS`
+    """
+    pairs = [(VISCOUS_BACKWARD, VISCOUS_FORWARD)]
+    forward, backward = (np.any(motion[:, NUMBERS.index(dry)] != 0.0) for dry in (DRY_FORWARD, DRY_BACKWARD))
+    return pairs + (
+        [(DRY_BACKWARD, DRY_FORWARD)] if not backward else [] if forward else [(DRY_FORWARD, DRY_BACKWARD)]
+    )
 
 
 def _least_squares(X: Floats, y: Floats) -> tuple[Floats, Floats, int]:
-    """Inverse (p, n) of columns (n, p), what they leave of y (n,), and their rank; columns of 0 get a row of 0."""
-    size = np.linalg.norm(X, axis=0)
-    scale = np.where(size > 0.0, size, 1.0)
+    """Inverse (p, n) of columns X (n, p), the remainder (n,) of y that they do not explain, and their rank; a
+    column of 0 gets a row of 0."""
+    length = np.linalg.norm(X, axis=0)
+    scale = np.where(length > 0.0, length, 1.0)
     if not len(y):
         return np.zeros(X.T.shape), y, 0
     U, s, Vt = np.linalg.svd(X / scale, full_matrices=False)
@@ -173,24 +181,24 @@ def _least_squares(X: Floats, y: Floats) -> tuple[Floats, Floats, int]:
     return (Vt[seen].T / s[seen]) @ U.T / scale[:, None], y - U @ (U.T @ y), int(np.sum(seen))
 
 
-def _spread(inverse: Floats, left: Floats, freedom: float) -> Floats:
-    """Covariance (p, p) of numbers by an inverse (p, n) from what is left (n,): a noise that is alike over the
-    record, and goes together over neighbouring rows; no less than if the rows were independent.
+def _covariance(inverse: Floats, remainder: Floats, freedom: float) -> Floats:
+    """Covariance (p, p) of numbers that `inverse` (p, n) makes of a force, whose noise is like the remainder (n,):
+    of one size over the record, and correlated over neighbouring rows; no less than if rows were independent.
 
     The autocovariances are weighted with a triangle (Newey and West 1987, known at second hand).
     """
-    n = len(left)
-    variance = float(left @ left) / max(freedom * OVERLAP, 1.0)
-    white = variance * inverse @ inverse.T
-    whole = white.copy()
+    n = len(remainder)
+    variance = float(remainder @ remainder) / max(freedom * OVERLAP, 1.0)
+    independent = variance * inverse @ inverse.T
+    correlated = independent.copy()
     reach = max(int(MEMORY * n), 4)
-    share = variance / max(float(left @ left), 1e-300)
+    share = variance / max(float(remainder @ remainder), 1e-300)
     for lag in range(1, min(reach, n - 1) + 1):
-        together = share * float(left[lag:] @ left[:-lag]) * (1.0 - lag / (reach + 1.0))
+        together = share * float(remainder[lag:] @ remainder[:-lag]) * (1.0 - lag / (reach + 1.0))
         products = inverse[:, lag:] @ inverse[:, :-lag].T
-        whole += together * (products + products.T)
-    larger = np.sqrt(np.maximum(np.diag(whole) / np.maximum(np.diag(white), 1e-300), 1.0))
-    return np.asarray(white * larger[:, None] * larger[None, :])
+        correlated += together * (products + products.T)
+    wider = np.sqrt(np.maximum(np.diag(correlated) / np.maximum(np.diag(independent), 1e-300), 1.0))
+    return np.asarray(independent * wider[:, None] * wider[None, :])
 
 
 GROUPS: Final = 6  # parts of a single record
@@ -212,20 +220,20 @@ def reason_of_misfit(
     """
     if not motion.driven:
         return ""
-    name, reversed_ = motion.force_name, replace(windows, force=-windows.force)
+    name, opposite = motion.force_name, replace(windows, force=-windows.force)
     groups = groups_of(windows, motion, records)
-    seen = {group: force_balance(windows.chosen(which), motion.resolution) for group, which in groups.items()}
-    along, against, own = list[str](), list[str](), list[str]()
+    balances = {group: force_balance(windows.chosen(which), motion.resolution) for group, which in groups.items()}
+    along, against, explained_alone = list[str](), list[str](), list[str]()
     for group, which in groups.items():
-        left = 1.0 - _explained(windows.chosen(_some(which)), motion, numbers)
-        left_reversed = 1.0 - _explained(reversed_.chosen(_some(which)), motion, numbers)
+        left = 1.0 - _explained_at_best(windows.chosen(_few_of(which)), motion, numbers)
+        left_opposite = 1.0 - _explained_at_best(opposite.chosen(_few_of(which)), motion, numbers)
         if left <= 1.0 - CLEARLY:
-            own.append(group)
-        if min(left, left_reversed) > 1.0 - CLEARLY:
+            explained_alone.append(group)
+        if min(left, left_opposite) > 1.0 - CLEARLY:
             continue
-        if left_reversed < BETTER * left and seen[group].against_mass:
+        if left_opposite < BETTER * left and balances[group].against_mass:
             against.append(group)
-        elif left < BETTER * left_reversed and seen[group].tells_mass:
+        elif left < BETTER * left_opposite and balances[group].tells_mass:
             along.append(group)
     if against and along:
         return (
@@ -233,12 +241,12 @@ def reason_of_misfit(
             f"{comma_list(along)}: a sign has flipped, change it there"
         )
     everywhere = np.ones(len(windows.first), dtype=bool)
-    if against or (not along and _turned(windows, reversed_, motion, numbers)):
+    if against or (not along and _sign_is_turned(windows, opposite, motion, numbers)):
         return f"a positive {name} accelerates backward: change the sign of one of the two columns"
-    if len(records) > 1 and len(own) == len(groups):
-        return f"each record by itself is explained, all together are not: {_differences(seen)}"
+    if len(records) > 1 and len(explained_alone) == len(groups):
+        return f"each record by itself is explained, all together are not: {_masses_by_record(balances)}"
     swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
-    share = _explained(swapped.chosen(_some(everywhere)), motion, numbers)
+    share = _explained_at_best(swapped.chosen(_few_of(everywhere)), motion, numbers)
     if share > SWAPPED:
         return (
             f"were the columns of position and {name} swapped, {100.0 * share:.4g} % would be explained: are "
@@ -248,39 +256,41 @@ def reason_of_misfit(
     return ""
 
 
-def _turned(windows: Windows, reversed_: Windows, motion: JointMotion, numbers: JointNumbers) -> bool:
+def _sign_is_turned(windows: Windows, opposite: Windows, motion: JointMotion, numbers: JointNumbers) -> bool:
     """Whether the force of the whole record falls with the acceleration, and explains the motion with its sign
     turned.
 
-    reversed_  the windows with the force's sign turned
+    opposite  the windows with the force's sign turned
     """
     if not force_balance(windows, motion.resolution).against_mass:
         return False
-    some = _some(np.ones(len(windows.first), dtype=bool))
-    left, left_reversed = (1.0 - _explained(one.chosen(some), motion, numbers) for one in (windows, reversed_))
-    return left_reversed <= 1.0 - CLEARLY and left_reversed < BETTER * left
+    some = _few_of(np.ones(len(windows.first), dtype=bool))
+    left, left_opposite = (
+        1.0 - _explained_at_best(one.chosen(some), motion, numbers) for one in (windows, opposite)
+    )
+    return left_opposite <= 1.0 - CLEARLY and left_opposite < BETTER * left
 
 
-def _differences(seen: Mapping[str, ForceBalance]) -> str:
+def _masses_by_record(balances: Mapping[str, ForceBalance]) -> str:
     """The mass by each record, and what may be the reason where they differ."""
     masses = list[str]()
-    for group, one in seen.items():
-        low, high = one.interval(ONE[MASS])
-        masses.append(f"{low:.3g} to {high:.3g} by {group}" if one.tells_mass else f"not told by {group}")
+    for group, balance in balances.items():
+        low, high = balance.interval(ONE[MASS])
+        masses.append(f"{low:.3g} to {high:.3g} by {group}" if balance.tells_mass else f"not told by {group}")
     return (
         f"the mass or inertia is {comma_list(masses)}; another device or load, another friction, or another unit "
         "or sign in one of them? Give them one by one"
     )
 
 
-def _explained(windows: Windows, motion: JointMotion, numbers: JointNumbers) -> float:
+def _explained_at_best(windows: Windows, motion: JointMotion, numbers: JointNumbers) -> float:
     """Share of the motion in windows that is explained by the numbers that explain it best."""
     found, starts = search_guess(windows, numbers, motion.resolution, motion.deviation, GUESSES)
     return explained(windows, squares_of(windows, found, starts))
 
 
-def _some(which: Flags) -> Flags:
-    """Which windows (W,) are looked at of these (W,): at most six, evenly spread."""
+def _few_of(which: Flags) -> Flags:
+    """At most `MOST` of the windows that `which` (W,) marks, evenly spread: marks (W,)."""
     places = np.flatnonzero(which)
     kept = places[np.unique(np.linspace(0, len(places) - 1, min(MOST, len(places))).astype(int))]
     return np.isin(np.arange(len(which)), kept)
@@ -352,7 +362,7 @@ def check_units(motion: JointMotion, joint: Joint) -> Check:
     faults, seen = list[str](), list[str]()
     if motion.step and not isnan(joint.step):
         ratio = motion.step / joint.step
-        slip = _slip(ratio, angular=joint.angular)
+        slip = _unit_slip(ratio, angular=joint.angular)
         said = (
             f"readings go in steps of {motion.step:.4g} {unit}, those of the file's encoder are {joint.step:.4g}"
         )
@@ -381,7 +391,7 @@ def check_units(motion: JointMotion, joint: Joint) -> Check:
     return Check("units", True, "; ".join(seen) or "the file has no numbers that readings could be compared with")
 
 
-def _slip(ratio: float, *, angular: bool) -> str:
+def _unit_slip(ratio: float, *, angular: bool) -> str:
     """Unit in which readings seem to be, by the ratio of their step to the file's; "" where it is no such unit."""
     for name, factor in SLIPS:
         if (name == "degrees") <= angular and abs(ratio / factor - 1.0) < SLIP:

@@ -20,6 +20,7 @@ from zwidth.identify.joint.fit import DELAY, DRIFTS, MASS, ONE, STIFFNESS
 from zwidth.identify.joint.identification import POOR, FittedJoint, fitted_joint
 from zwidth.identify.joint.joint import COLUMNS as COLUMNS
 from zwidth.identify.joint.joint import Joint
+from zwidth.identify.joint.motion import DRY_BACKWARD, DRY_FORWARD, VISCOUS_BACKWARD, VISCOUS_FORWARD
 from zwidth.identify.joint.record import JointMotion
 from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
 from zwidth.identify.records.record import Record
@@ -116,12 +117,13 @@ def identification(
     )
 
 
-def _estimate(
+def _sum_estimate(
     fitted: FittedJoint, name: str, quantity: str, weights: Any, *, key: str = "", least: float = -np.inf
 ) -> Estimate:
     """A sum over the numbers, weights (10,), as an estimate, in the file's key where it has one.
 
-    quantity  that `Joint.unit` names;   key  of `Joint.paths`;   least  value below which it is not given
+    quantity  that `Joint.unit` names;   key  of `Joint.paths`, "" for none;   least  value below which it is not
+              given
     """
     value, low, high = fitted.interval(np.asarray(weights, dtype=float))
     path, factor = fitted.joint.paths.get(key, ("", 1.0))
@@ -140,23 +142,40 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
     estimates = []
     if both:
         estimates = [
-            _estimate(fitted, "dry friction", "force", 0.5 * (ONE[3] + ONE[4]), key="coulomb", least=0.0),
-            _estimate(fitted, "viscous friction", "damping", 0.5 * (ONE[1] + ONE[2]), key="damping", least=0.0),
-            _estimate(fitted, "bias", "force", 0.5 * (ONE[4] - ONE[3])),
+            _sum_estimate(
+                fitted,
+                "dry friction",
+                "force",
+                0.5 * (ONE[DRY_FORWARD] + ONE[DRY_BACKWARD]),
+                key="coulomb",
+                least=0.0,
+            ),
+            _sum_estimate(
+                fitted,
+                "viscous friction",
+                "damping",
+                0.5 * (ONE[VISCOUS_FORWARD] + ONE[VISCOUS_BACKWARD]),
+                key="damping",
+                least=0.0,
+            ),
+            _sum_estimate(fitted, "bias", "force", 0.5 * (ONE[DRY_BACKWARD] - ONE[DRY_FORWARD])),
         ]
     else:
-        one = ONE[1] if fitted.forward else ONE[2]
-        estimates = [_estimate(fitted, "viscous friction", "damping", one, key="damping", least=0.0)]
-    for there, way, level, damping in ((fitted.forward, "forward", 3, 1), (fitted.backward, "backward", 4, 2)):
+        one = ONE[VISCOUS_FORWARD] if fitted.forward else ONE[VISCOUS_BACKWARD]
+        estimates = [_sum_estimate(fitted, "viscous friction", "damping", one, key="damping", least=0.0)]
+    for there, way, level, damping in (
+        (fitted.forward, "forward", DRY_FORWARD, VISCOUS_FORWARD),
+        (fitted.backward, "backward", DRY_BACKWARD, VISCOUS_BACKWARD),
+    ):
         if not there:
             continue
         speed = usual_speed(fitted, 1.0 if way == "forward" else -1.0)
         unit = fitted.joint.unit("position")
-        # one letter: numbers of the joint themselves, never over a factor of the file
+        # without a key: numbers of the joint themselves, never times a factor of the file
         estimates += [
-            _estimate(fitted, f"level {way}", "force", ONE[level]),
-            _estimate(fitted, f"viscous friction {way}", "damping", ONE[damping]),
-            _estimate(
+            _sum_estimate(fitted, f"level {way}", "force", ONE[level]),
+            _sum_estimate(fitted, f"viscous friction {way}", "damping", ONE[damping]),
+            _sum_estimate(
                 fitted,
                 f"friction {way} at {speed:.3g} {unit}/s",
                 "force",
@@ -164,7 +183,7 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
             ),
         ]
     if STIFFNESS in fitted.fit.numbers.free:
-        spring = _estimate(fitted, "spring", "stiffness", ONE[STIFFNESS], key="stiffness")
+        spring = _sum_estimate(fitted, "spring", "stiffness", ONE[STIFFNESS], key="stiffness")
         estimates.append(spring if spring.value > 0.0 else replace(spring, path=""))
     return estimates
 
@@ -174,7 +193,7 @@ def mass_estimates(fitted: FittedJoint) -> list[Estimate]:
     if not fitted.motion.driven:
         return []
     delay = fitted.fit.interval(ONE[DELAY])
-    mass = _estimate(fitted, fitted.joint.mass_name, "mass", ONE[MASS], key="mass", least=0.0)
+    mass = _sum_estimate(fitted, fitted.joint.mass_name, "mass", ONE[MASS], key="mass", least=0.0)
     if not fitted.tells_mass:
         mass = replace(mass, value=nan, low=-inf, high=inf, told="no", reason=untold_mass(fitted))
     return [
@@ -207,22 +226,28 @@ def usual_speed(fitted: FittedJoint, side: float) -> float:
 
 def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
     """Mean velocity (s,) and friction (s,) in segments in which the joint slides one way throughout."""
-    windows, v = fitted.fit.windows, fitted.fit.numbers.values
+    windows, numbers = fitted.fit.windows, fitted.fit.numbers.values
     if fitted.motion.driven and not fitted.tells_mass:  # what accelerates the mass cannot be taken from the force
         return np.zeros(0), np.zeros(0)
     size = int(max(np.median(windows.length) // 8, SHORTEST))
-    delay = max(round(float(v[DELAY]) / float(np.mean(windows.period))), 0)
+    delay = max(round(float(numbers[DELAY]) / float(np.mean(windows.period))), 0)
+    # columns of A: weighted acceleration, velocity, sliding forward, less sliding backward, position
     A, force = weighted_balance(windows, size, fitted.motion.resolution, [delay], 1.0)
-    whole = float(np.sum(weighting(size)[0]))
-    one_way = np.abs(A[:, 2] + A[:, 3]) > 0.999 * whole
+    sum_of_weights = float(np.sum(weighting(size)[0]))
+    one_way = np.abs(A[:, 2] + A[:, 3]) > 0.999 * sum_of_weights
     A, force = A[one_way], force[one_way, 0]
-    return A[:, 1] / whole, (force - v[MASS] * A[:, 0] - v[STIFFNESS] * A[:, 4]) / whole
+    return A[:, 1] / sum_of_weights, (
+        force - numbers[MASS] * A[:, 0] - numbers[STIFFNESS] * A[:, 4]
+    ) / sum_of_weights
 
 
 def check_speeds(fitted: FittedJoint) -> Check:
     """Whether viscous and dry friction can be told apart: at one speed only their sum is seen."""
     alike, known = list[str](), list[str]()
-    for there, way, level, damping in ((fitted.forward, "forward", 3, 1), (fitted.backward, "backward", 4, 2)):
+    for there, way, level, damping in (
+        (fitted.forward, "forward", DRY_FORWARD, VISCOUS_FORWARD),
+        (fitted.backward, "backward", DRY_BACKWARD, VISCOUS_BACKWARD),
+    ):
         free = fitted.fit.numbers.free
         if there:
             pair = [free.index(level), free.index(damping)]
@@ -275,7 +300,7 @@ def mass_in_file(fitted: FittedJoint) -> list[Check]:
 
 
 def check_drift(fitted: FittedJoint) -> list[Check]:
-    """Whether the bias drifts: a warning, or nothing."""
+    """Whether the bias drifts: a warning; [] where it does not."""
     if not {*DRIFTS} & {*fitted.fit.numbers.free}:
         return []
     value, low, high = fitted.fit.interval(ONE[DRIFTS[0]] + 2.0 * ONE[DRIFTS[2]])  # growth, see `Windows.drifts`
@@ -293,7 +318,7 @@ def check_drift(fitted: FittedJoint) -> list[Check]:
 
 
 def check_remainder(fitted: FittedJoint) -> list[Check]:
-    """Whether more remains than the readings' noise: a warning, or nothing.
+    """Whether more remains than the readings' noise: a warning; [] where it does not.
 
     What scatters from window to window is in the intervals; what is alike in all of them, as a friction that hangs
     on the load, is not.
@@ -314,9 +339,9 @@ def check_remainder(fitted: FittedJoint) -> list[Check]:
 
 
 def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
-    """Sentences beside the numbers, and further keys of the result."""
+    """Sentences beside the numbers, and further keys and values of the result."""
     joint, motion = fitted.joint, fitted.motion
-    used = _force_text(joint, motion.force_name if motion.driven else "")
+    used = _force_remark(joint, motion.force_name if motion.driven else "")
     remarks = [*joint.remarks, used]
     details: dict[str, Any] = {
         "measured_at": joint.place,
@@ -356,7 +381,7 @@ def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
     return remarks, details
 
 
-def _force_text(joint: Joint, name: str) -> str:
+def _force_remark(joint: Joint, name: str) -> str:
     """Which force was used, and what that means."""
     if not name:
         return "free motion: friction follows only as a ratio to the mass"
@@ -398,20 +423,22 @@ def compare_with_command(motion: JointMotion) -> Comparison | None:
         return None
     shifts = np.arange(-2, LATEST + 1)
     measured = np.concatenate([force[LATEST:-2] for force, _ in pairs])
-    sums = np.zeros((len(shifts), 2))
-    for n, k in enumerate(shifts):
-        moved = np.concatenate([command[LATEST - k : len(command) - 2 - k] for _, command in pairs])
+    correlations_and_gains = np.zeros((len(shifts), 2))
+    for row, shift in enumerate(shifts):
+        moved = np.concatenate([command[LATEST - shift : len(command) - 2 - shift] for _, command in pairs])
         if len(moved) < 10 or np.std(moved) == 0.0 or np.std(measured) == 0.0:
             return None
         slope = float(np.cov(moved, measured)[0, 1])
-        sums[n] = slope / (np.std(moved) * np.std(measured)), slope / np.var(moved)
-    best = int(np.argmax(sums[:, 0]))
+        correlations_and_gains[row] = slope / (np.std(moved) * np.std(measured)), slope / np.var(moved)
+    best = int(np.argmax(correlations_and_gains[:, 0]))
     inner = min(max(best, 1), len(shifts) - 2)
-    before, here, after = sums[inner - 1 : inner + 2, 0]
-    bend = before - 2.0 * here + after
-    part = 0.5 * (before - after) / bend if bend < 0.0 and best == inner else 0.0
+    before, here, after = correlations_and_gains[inner - 1 : inner + 2, 0]
+    curvature = before - 2.0 * here + after
+    fraction = 0.5 * (before - after) / curvature if curvature < 0.0 and best == inner else 0.0
     return Comparison(
-        float(sums[best, 1]), float((shifts[best] + part) * motion.sections[0].period), float(sums[best, 0])
+        float(correlations_and_gains[best, 1]),
+        float((shifts[best] + fraction) * motion.sections[0].period),
+        float(correlations_and_gains[best, 0]),
     )
 
 

@@ -37,6 +37,7 @@ from zwidth.identify.joint.force_balance import (
     reason_of_misfit,
 )
 from zwidth.identify.joint.joint import Joint, joint_of
+from zwidth.identify.joint.motion import DRY_BACKWARD, DRY_FORWARD, VISCOUS_BACKWARD, VISCOUS_FORWARD
 from zwidth.identify.joint.record import JointMotion, read_motion, windows_of
 from zwidth.identify.joint.start import first_starts, search_guess
 from zwidth.identify.records.record import Record
@@ -152,10 +153,10 @@ def fitted_joint(
     mass = _assumed_mass(device, joint, motion, mass_from_file)
     report("fitting", steps - 3, steps)
     forward, backward = directions(windows, motion)
-    numbers = _numbers(motion, forward, backward, mass, spring is not False)
-    fit, outlying = _fit(windows, motion, numbers, spring)
+    numbers = _first_numbers(motion, forward, backward, mass, spring is not False)
+    fit, outlying = _fit_seen_windows(windows, motion, numbers, spring)
     report("validating", steps - 1, steps)
-    unseen, starts, share, left_out = _validation(fit, windows, motion)
+    unseen, starts, share, left_out = _predict_unseen(fit, windows, motion)
     unit_mass = not motion.driven and not mass_from_file
     outlying += left_out
     balance = balance_of(fit, motion) if motion.driven else None
@@ -186,11 +187,11 @@ def _read_motion(
         return checks, None
     report("reading records", len(records), steps)
     motion = read_motion(records, samplings, joint)
-    checks += _enough(motion, samplings)
+    checks += _check_stretches(motion, samplings)
     if any(not check.passed for check in checks):
         return checks, None
     checks += check_periods(records, samplings, device.controller.sampling_period)
-    motion = _limited(motion, joint)
+    motion = _with_limited_commands(motion, joint)
     windows = windows_of(motion)
     checks += checks_of(motion, windows, joint)
     if motion.driven and all(check.passed or check.warning for check in checks):
@@ -213,7 +214,7 @@ def _assumed_mass(device: Device, joint: Joint, motion: JointMotion, mass_from_f
     return mass
 
 
-def _validation(
+def _predict_unseen(
     fit: JointFit, windows: Windows, motion: JointMotion
 ) -> tuple[Windows, Floats, float, tuple[float, ...]]:
     """Predict the windows that were not fitted.
@@ -221,11 +222,11 @@ def _validation(
     Returns  them, their starts (W, 2), the share of their motion that is predicted, and the times of those left
              out, as they do not follow the model [s]
     """
-    unseen = windows.chosen(_unseen(windows))
+    unseen = windows.chosen(_unseen_windows(windows))
     starts = first_starts(unseen, fit.numbers.values)
     _, starts, squares = approach(unseen, replace(fit.numbers, free=(), tied=()), starts, 20)
-    kept = squares <= OUTLYING**2 * _mean_square(fit, motion) * unseen.length
-    kept |= np.mean(~kept) > MOST_OUTLYING  # then it is the model that is wrong
+    kept = squares <= OUTLYING**2 * _usual_mean_square(fit, motion) * unseen.length
+    kept |= np.mean(~kept) > MOST_OUTLYING  # all, as then it is the model that is wrong
     share = explained(unseen.chosen(kept), squares[kept])
     return unseen, starts, share, tuple(unseen.time[~kept].tolist())
 
@@ -236,14 +237,14 @@ def _checks_after_fit(
     """Check the model, the search's end, and what the recorded force depends on; return these checks."""
     checks = [_check_model(fitted, windows, numbers, records)]
     if (checks[-1].passed or checks[-1].warning) and not fitted.fit.converged:
-        checks.append(_no_minimum(fitted.fit))  # a model that is wrong is the better reason
+        checks.append(_no_minimum_check(fitted.fit))  # a model that is wrong is the better reason
     if fitted.balance is not None and (checks[-1].passed or checks[-1].warning):
         checks += check_dependence(fitted.balance, fitted.motion)
     return checks
 
 
 def _balance_before(windows: Windows, motion: JointMotion, records: Sequence[Record]) -> ForceBalance:
-    """The balance of all windows, which depends where that of a part does: a sign that flips may hide it."""
+    """The balance of all windows, `depends` where that of any part does: a sign that flips may hide it in all."""
     whole = force_balance(windows, motion.resolution)
     if whole.depends is not False:
         return whole
@@ -259,7 +260,7 @@ def balance_of(fit: JointFit, motion: JointMotion) -> ForceBalance:
     return force_balance(fit.windows, motion.resolution, delay=float(values[DELAY]), spring=spring)
 
 
-def _enough(motion: JointMotion, samplings: Sequence[SampleTimes]) -> list[Check]:
+def _check_stretches(motion: JointMotion, samplings: Sequence[SampleTimes]) -> list[Check]:
     """Fail where no stretch without a gap is long enough to be cut into windows; [] where one is."""
     if motion.sections:
         return []
@@ -268,7 +269,7 @@ def _enough(motion: JointMotion, samplings: Sequence[SampleTimes]) -> list[Check
     return [Check("gaps", False, reason)]
 
 
-def _limited(motion: JointMotion, joint: Joint) -> JointMotion:
+def _with_limited_commands(motion: JointMotion, joint: Joint) -> JointMotion:
     """The motion with forces as the drive limits them, where they are commands."""
     if not np.isfinite(joint.limit) or motion.force_name not in ("current_A", joint.command):
         return motion
@@ -277,30 +278,34 @@ def _limited(motion: JointMotion, joint: Joint) -> JointMotion:
     return replace(motion, sections=tuple(sections))
 
 
-def _numbers(motion: JointMotion, forward: bool, backward: bool, mass: float, spring: bool) -> JointNumbers:
+def _first_numbers(motion: JointMotion, forward: bool, backward: bool, mass: float, spring: bool) -> JointNumbers:
     """The numbers to begin with, 0 but for the mass, and which are fitted: friction of a direction only where the
-    joint slides so, else it is tied to the other direction's."""
+    joint slides so, else it is tied to the other direction's.
+
+    spring  whether a stiffness is fitted
+    """
     free: tuple[int, ...] = (MASS, DELAY) if motion.driven else ()
-    free += (1, 3) if forward else ()  # viscous and dry friction
-    free += (2, 4) if backward else ()
+    free += (VISCOUS_FORWARD, DRY_FORWARD) if forward else ()
+    free += (VISCOUS_BACKWARD, DRY_BACKWARD) if backward else ()
     free += (STIFFNESS, DRIFTS[0]) if spring else (DRIFTS[0],)
-    tied = () if forward and backward else ((2, 1), (4, 3)) if forward else ((1, 2), (3, 4))
+    viscous, dry = (VISCOUS_BACKWARD, VISCOUS_FORWARD), (DRY_BACKWARD, DRY_FORWARD)
+    tied = () if forward and backward else (viscous, dry) if forward else (viscous[::-1], dry[::-1])
     return JointNumbers(mass * ONE[MASS], tuple(sorted(free)), tied)
 
 
-def _unseen(windows: Windows) -> Flags:
+def _unseen_windows(windows: Windows) -> Flags:
     """Which windows (W,) are kept for validation: every third."""
     return np.asarray(np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1)
 
 
-def _mean_square(fit: JointFit, motion: JointMotion) -> float:
+def _usual_mean_square(fit: JointFit, motion: JointMotion) -> float:
     """Median of the windows' mean squared residuals, at least that of the readings' noise [m² or rad²]."""
     edges = np.cumsum(fit.windows.length) - fit.windows.length
     means = np.add.reduceat(fit.residuals**2, edges) / fit.windows.length
     return max(float(np.median(means)), motion.deviation**2)
 
 
-def _fit(
+def _fit_seen_windows(
     windows: Windows, motion: JointMotion, numbers: JointNumbers, spring: bool | None
 ) -> tuple[JointFit, tuple[float, ...]]:
     """The fit without windows that follow no such model, and with a spring where there is one; and the times of
@@ -308,25 +313,28 @@ def _fit(
 
     spring  whether one acts; None: where the data show one
     """
-    seen = windows.chosen(~_unseen(windows))
+    seen = windows.chosen(~_unseen_windows(windows))
     guess, starts = search_guess(seen, numbers, motion.resolution, motion.deviation)
     fit = fit_joint(seen, guess, starts)
     doubtful = [n for n in (STIFFNESS, *DRIFTS) if n in guess.free and (spring is None or n != STIFFNESS)]
     hidden = not_shown(fit, doubtful)
-    if DRIFTS[0] not in hidden or _mean_square(fit, motion) > POOR**2 * motion.deviation**2:
+    # where an even drift is seen, or more remains than noise, the bias may drift in a bent way, too
+    if DRIFTS[0] not in hidden or _usual_mean_square(fit, motion) > POOR**2 * motion.deviation**2:
         wider = replace(fit.numbers, free=tuple(sorted({*fit.numbers.free, *DRIFTS})))
         fit = fit_joint(seen, wider, fit.starts)
         hidden = not_shown(fit, [*doubtful, *DRIFTS[1:]])
     edges = np.cumsum(seen.length) - seen.length
     means = np.add.reduceat(fit.residuals**2, edges) / seen.length
-    bad = means > OUTLYING**2 * _mean_square(fit, motion)
-    if not bad.any() or np.mean(bad) > MOST_OUTLYING:
-        bad[:] = False
-    if hidden or bad.any():
+    outlying = means > OUTLYING**2 * _usual_mean_square(fit, motion)
+    if not outlying.any() or np.mean(outlying) > MOST_OUTLYING:
+        outlying[:] = False
+    if hidden or outlying.any():
         free = tuple(i for i in fit.numbers.free if i not in hidden)
         values = np.where(np.isin(np.arange(COUNT), hidden), 0.0, fit.numbers.values)
-        fit = fit_joint(seen.chosen(~bad), replace(fit.numbers, free=free, values=values), fit.starts[~bad])
-    return fit, tuple(seen.time[bad].tolist())
+        fit = fit_joint(
+            seen.chosen(~outlying), replace(fit.numbers, free=free, values=values), fit.starts[~outlying]
+        )
+    return fit, tuple(seen.time[outlying].tolist())
 
 
 def not_shown(fit: JointFit, numbers: Sequence[int]) -> list[int]:
@@ -346,20 +354,20 @@ def not_shown(fit: JointFit, numbers: Sequence[int]) -> list[int]:
         if not abs(value) > error * t.ppf(0.5 + 0.5 * SHOWN, freedom)
     ]
     shown = max((number for number in numbers if number in DRIFTS and number not in hidden), default=0)
-    hidden = [number for number in hidden if number not in DRIFTS or number > shown]
+    hidden = [number for number in hidden if number not in DRIFTS or number > shown]  # lower shapes stay
     if len(hidden) < 2:
         return hidden
     places = [fit.numbers.free.index(number) for number in hidden]
     spread = fit.covariance[np.ix_(places, places)]
     if not np.all(np.isfinite(spread)):
         return hidden
-    z = fit.numbers.values[hidden]
-    squares = float(z @ np.linalg.pinv(spread, hermitian=True) @ z)
+    values = fit.numbers.values[hidden]
+    squares = float(values @ np.linalg.pinv(spread, hermitian=True) @ values)
     freedom = min(tests[number][2] for number in hidden)
     return [] if squares > len(hidden) * f.ppf(SHOWN, len(hidden), freedom) else hidden
 
 
-def _no_minimum(fit: JointFit) -> Check:
+def _no_minimum_check(fit: JointFit) -> Check:
     """The failed check of a search that has not arrived, as intervals hold about the best numbers only."""
     count = len(fit.windows.first)
     return Check(

@@ -115,7 +115,7 @@ def joint_of(device: Device, name: str | int | None = None) -> Joint:
     """
     given = None if name is None else str(name)
     if device.mechanism is None:
-        return _of_plant(device, given)
+        return _joint_of_plant(device, given)
     tables = table(device.document, "mechanism")
     drives = {one.entry["name"]: (i, one) for i, one in enumerate(members(tables, "drives"))}
     links = {one.entry["name"]: one for one in members(tables, "links")}
@@ -124,14 +124,15 @@ def joint_of(device: Device, name: str | int | None = None) -> Joint:
             raise fail(device.label, "joint", f"must be named: one of {comma_list([*drives, *links])}")
         given = next(iter(drives))
     if given in drives:
-        return _at_motor(device, *drives[given], links)
+        return _joint_at_motor(device, *drives[given], links)
     if given in links:
-        return _at_link(device, links[given], drives)
+        return _joint_at_link(device, links[given], drives)
     raise fail(device.label, "joint", f"'{given}' is no drive or link; {suggestion(given, [*drives, *links])}")
 
 
-def _of_plant(device: Device, name: str | None) -> Joint:
-    """The coordinate of a plant given by its matrices, by its number; of a measured response a joint without keys.
+def _joint_of_plant(device: Device, name: str | None) -> Joint:
+    """The joint that is a coordinate of a plant given by its matrices, `name` its number; of a measured response
+    one without keys.
 
     Raises  DeviceError  where the number is missing or no coordinate's
     """
@@ -152,7 +153,7 @@ def _of_plant(device: Device, name: str | None) -> Joint:
     limit = table(table(document, "loop"), "saturation").get("force_N", inf)
     step = float(encoder) if encoder else nan
     if n == 1:
-        return _of_single_coordinate(plant, document, step, float(limit))
+        return _joint_of_single_coordinate(plant, document, step, float(limit))
     levels = table(document, "friction").get("coulomb_N")
     path = {"coulomb": (f"friction.coulomb_N.{i}", 1.0)} if isinstance(levels, list) else {}
     remark = (
@@ -162,15 +163,16 @@ def _of_plant(device: Device, name: str | None) -> Joint:
     return Joint(f"{label} of the plant", False, step=step, limit=float(limit), paths=path, remarks=(remark,))
 
 
-def _of_single_coordinate(plant: Plant, document: dict[str, Any], step: float, limit: float) -> Joint:
+def _joint_of_single_coordinate(plant: Plant, document: dict[str, Any], step: float, limit: float) -> Joint:
     """Give the joint of a plant of one coordinate: its mass at the encoder [kg], and the paths of its numbers.
 
     document     of the device file;   step, limit  of the encoder [m]; largest force [N]
     """
-    # the file's numbers are those of the coordinate q: position s q at the encoder, force a f on the coordinate
+    # the file's numbers are those of the coordinate q: position s q at the encoder, force a f on the coordinate;
+    # those at the encoder are these over s a
     s, a = float(plant.sensor[0]), float(plant.actuator[0])
     numbers = table(document, "plant")
-    ends = {
+    ends = {  # of the path, where the file has a matrix
         key: ".0.0" * isinstance(numbers.get(key), list)
         for key in ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
     }
@@ -197,7 +199,11 @@ def _path_in_file(member: LegMember, key: str, document: dict[str, Any]) -> str:
 
 
 def _link_paths(link: LegMember, document: dict[str, Any], ratio: float) -> dict[str, tuple[str, float]]:
-    """`Joint.paths` of a joint's own damper and spring; from numbers at the motor (ratio, not 1) by its square."""
+    """`Joint.paths` of a joint's own damper and spring.
+
+    ratio  of the transmission where the numbers are at the motor: those at the joint are its square times as
+           large; 1 where they are at the joint
+    """
     along = link.entry.get("joint") == "prismatic"
     damping, stiffness = ("Ns_per_m", "N_per_m") if along else ("Nms_per_rad", "Nm_per_rad")
     return {
@@ -206,7 +212,7 @@ def _link_paths(link: LegMember, document: dict[str, Any], ratio: float) -> dict
     }
 
 
-def _at_motor(device: Device, index: int, drive: LegMember, links: dict[str, LegMember]) -> Joint:
+def _joint_at_motor(device: Device, index: int, drive: LegMember, links: dict[str, LegMember]) -> Joint:
     """The joint read at the shaft of a drive's motor, with its numbers there; the drive's index, links by name."""
     assert device.mechanism is not None
     drives, entry = device.mechanism.drives, drive.entry
@@ -239,9 +245,9 @@ def _at_motor(device: Device, index: int, drive: LegMember, links: dict[str, Leg
     )
 
 
-def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMember]]) -> Joint:
-    """The joint read at a link itself, with the numbers of the motor that turns it (index and drive by name)
-    reflected there. Raises DeviceError for a joint that neither turns nor slides."""
+def _joint_at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMember]]) -> Joint:
+    """The joint read at a link itself, with the numbers of the motor that turns it (`drives` by name, with
+    their index) reflected there. Raises DeviceError for a joint that neither turns nor slides."""
     entry, document = link.entry, device.document
     name, kind = entry["name"], entry.get("joint")
     if kind not in ("revolute", "prismatic"):
@@ -300,6 +306,6 @@ def _inertia_at_motor(device: Device, index: int) -> float:
     ratio = float(np.asarray(drives.transmission)[..., index])
     if posture is None or index not in kept:
         return nan
-    place = kept.index(index)
+    place = kept.index(index)  # row of the drive in the mass matrix, which has no surplus drives
     rotor = float(np.asarray(drives.motor_inertia)[..., index])
     return rotor + float(posture.mass_matrix[place, place]) / ratio**2

@@ -107,8 +107,9 @@ def read_motion(records: Sequence[Record], samplings: Sequence[SampleTimes], joi
             f"and the other records differ in what drives the joint, {listed}; give records alike"
         )
     sections, run = list[RecordSection](), 0
-    for n, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
-        name, factor = columns[n]
+    for number, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
+        name, factor = columns[number]
+        # the command is kept beside a force that was measured, to be compared with it
         beside = joint.command if name not in ("", joint.command) and joint.command in record else ""
         planned = planned_sections(sampling.runs, total)
         parts: list[list[tuple[Floats, ...]]] = [[] for _ in planned]
@@ -121,11 +122,11 @@ def read_motion(records: Sequence[Record], samplings: Sequence[SampleTimes], joi
                     force = factor * piece[name][inside] if name else zero
                     command = piece[beside][inside] if beside else zero
                     parts[k].append((piece["time_s"][inside], piece[joint.position][inside], force, command))
-        for (_, _, stretch), some in zip(planned, parts, strict=True):
-            time, position, force, command = (np.concatenate(one) for one in zip(*some, strict=True))
+        for (_, _, stretch), pieces in zip(planned, parts, strict=True):
+            time, position, force, command = (np.concatenate(one) for one in zip(*pieces, strict=True))
             kept = command if beside else np.zeros(0)
             sections.append(
-                RecordSection(float(time[0]), sampling.period, n, run + stretch, position, force, kept)
+                RecordSection(float(time[0]), sampling.period, number, run + stretch, position, force, kept)
             )
         run += len(sampling.runs)
     name = columns[0][0]
@@ -141,17 +142,18 @@ def planned_sections(runs: Ints, total: int) -> list[tuple[int, int, int]]:
 
     runs   (s, 2) first row, and the one behind the last, of its stretches;   total  samples of all records
     """
-    long = [(int(a), int(b), n) for n, (a, b) in enumerate(runs) if b - a >= FEWEST + BEFORE]
+    long_enough = [(int(a), int(b), stretch) for stretch, (a, b) in enumerate(runs) if b - a >= FEWEST + BEFORE]
     if total <= MOST:
-        return long
+        return long_enough
     length = MOST // SECTIONS
     planned = []
-    for a, b, n in long:
+    for a, b, stretch in long_enough:
         many = max(1, round((b - a) * SECTIONS / total))
-        if (b - a) * SECTIONS < 0.5 * total and n % max(1, round(len(long) / SECTIONS)):
+        # of short stretches every so many is taken
+        if (b - a) * SECTIONS < 0.5 * total and stretch % max(1, round(len(long_enough) / SECTIONS)):
             continue
         for start in np.linspace(a, max(b - length, a), many).astype(int):
-            planned.append((int(start), int(min(start + length, b)), n))
+            planned.append((int(start), int(min(start + length, b)), stretch))
     return planned
 
 
@@ -172,8 +174,10 @@ def windows_of(motion: JointMotion) -> Windows:
     total = sum(lengths)
     windows = None
     for many in MANY:
-        windows = _cut(motion, max(total // many, FEWEST))
-        bends = [_bend(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)]
+        windows = _cut_sections(motion, max(total // many, FEWEST))
+        bends = [
+            _largest_bend(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)
+        ]
         moves = np.array(
             [np.ptp(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)]
         )
@@ -184,26 +188,26 @@ def windows_of(motion: JointMotion) -> Windows:
     return windows.chosen(moving)
 
 
-def _bend(y: Floats) -> float:
+def _largest_bend(y: Floats) -> float:
     """By how much a motion leaves the straight line between its ends, at most [m or rad]."""
     return float(np.max(np.abs(y - np.linspace(y[0], y[-1], len(y)))))
 
 
-def _cut(motion: JointMotion, length: int) -> Windows:
+def _cut_sections(motion: JointMotion, length: int) -> Windows:
     """All sections cut into windows of about `length` samples; first samples are left for a force that is late."""
     first, lengths, period, time, run = list[int](), list[int](), list[float](), list[float](), list[int]()
     row, before = 0, BEFORE if motion.driven else 0
-    for one in motion.sections:
-        samples = len(one.position) - before
+    for section in motion.sections:
+        samples = len(section.position) - before
         many = max(1, round(samples / length))
         edges = np.linspace(before, before + samples, many + 1).astype(int)
         for a, b in pairwise(edges):
             first.append(row + a)
             lengths.append(b - a)
-            period.append(one.period)
-            time.append(one.time + a * one.period)
-            run.append(one.run)
-        row += len(one.position)
+            period.append(section.period)
+            time.append(section.time + a * section.period)
+            run.append(section.run)
+        row += len(section.position)
     return Windows(
         motion.positions - motion.reference,
         motion.forces,

@@ -64,11 +64,11 @@ def weighted_balance(
     Returns  (s, 5) of m, b, F forward and backward, and k, and (s, D) of the force
     """
     weight = weighting(size)[0]
-    rows, at, _ = force_balance_rows(windows, size, step, moving)
+    rows, samples, _ = force_balance_rows(windows, size, step, moving)
     # a force is held from its sample to the next: its mean about a sample is that of two
     forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
     last = len(windows.position) - 1
-    right = [forces[np.clip(at - delay, 0, last)] @ weight for delay in delays]
+    right = [forces[np.clip(samples - delay, 0, last)] @ weight for delay in delays]
     return rows, np.stack(right, axis=1)
 
 
@@ -82,22 +82,22 @@ def force_balance_rows(windows: Windows, size: int, step: float, moving: float) 
         for first, length in zip(windows.first, windows.length, strict=True)
     ]
     T = np.repeat(windows.period, [len(some) for some in starts])
-    at = np.concatenate(starts)[:, None] + np.arange(size)
+    samples = np.concatenate(starts)[:, None] + np.arange(size)
     last = len(windows.position) - 1
-    moved = windows.position[np.minimum(at + reach, last)] - windows.position[np.maximum(at - reach, 0)]
-    side = np.where(np.abs(moved) > 1.5 * step, np.sign(moved), 0.0)
-    kept = np.mean(side != 0.0, axis=1) >= moving
-    at, side, T = at[kept], side[kept], T[kept]
-    place = windows.position[at]
-    y = place - place[:, :1]
+    moved = windows.position[np.minimum(samples + reach, last)] - windows.position[np.maximum(samples - reach, 0)]
+    direction = np.where(np.abs(moved) > 1.5 * step, np.sign(moved), 0.0)
+    kept = np.mean(direction != 0.0, axis=1) >= moving
+    samples, direction, T = samples[kept], direction[kept], T[kept]
+    positions = windows.position[samples]
+    moved_from_start = positions - positions[:, :1]
     rows = [
-        y @ bend / T**2,
-        -(y @ slope) / T,
-        (side > 0.0) @ weight,
-        -((side < 0.0) @ weight),
-        place @ weight,
+        moved_from_start @ bend / T**2,
+        -(moved_from_start @ slope) / T,
+        (direction > 0.0) @ weight,
+        -((direction < 0.0) @ weight),
+        positions @ weight,
     ]
-    return np.stack(rows, axis=1), at, T
+    return np.stack(rows, axis=1), samples, T
 
 
 def weighting(size: int) -> tuple[Floats, Floats, Floats]:
@@ -124,28 +124,29 @@ def first_guess(
         return None
     A = A if spring else A[:, :4]
     T = float(np.mean(windows.period))
-    if not windows.driven:
-        return _balanced(A[:, 1:], -A[:, 0], False, 0.0)
-    guesses = [_balanced(A, f, True, delay * T) for delay, f in zip(delays, forces.T, strict=True)]
+    if not windows.driven:  # the mass times the acceleration, for a mass of 1, balances what resists
+        return _guess_of_balance(A[:, 1:], -A[:, 0], False, 0.0)
+    guesses = [_guess_of_balance(A, f, True, delay * T) for delay, f in zip(delays, forces.T, strict=True)]
     return max(guesses, key=lambda guess: guess.explained)
 
 
-def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
-    """The guess by least squares of forces f (s,), with this delay of the force [s].
+def _guess_of_balance(columns: Floats, forces: Floats, driven: bool, delay: float) -> Guess:
+    """The guess by least squares of forces (s,), with this delay of the force [s].
 
-    A (s, c)  columns: m (only where driven), b, F forward, F backward, perhaps k; not driven, all over the mass
+    columns (s, c)  of m (only where driven), b, F forward, F backward, perhaps k; not driven, all over the mass
     """
-    norms = np.linalg.norm(A, axis=0)
+    norms = np.linalg.norm(columns, axis=0)
     used = norms > 0.0
-    scaled = A[:, used] / norms[used]
-    x = np.linalg.lstsq(scaled, f, rcond=1e-10)[0]
-    left, total = f - scaled @ x, float(f @ f)
-    explained = 1.0 - float(left @ left) / total if total > 0.0 else 0.0
-    numbers = np.zeros(A.shape[1])
+    scaled = columns[:, used] / norms[used]
+    x = np.linalg.lstsq(scaled, forces, rcond=1e-10)[0]
+    remainder, total = forces - scaled @ x, float(forces @ forces)
+    explained = 1.0 - float(remainder @ remainder) / total if total > 0.0 else 0.0
+    numbers = np.zeros(columns.shape[1])
     numbers[used] = x / norms[used]
     error = 0.0
     if driven:
-        deviation = np.sqrt(2.0 * float(left @ left) / max(len(f) - A.shape[1], 1))  # segments overlap by half
+        # twice the variance, as segments overlap by half
+        deviation = np.sqrt(2.0 * float(remainder @ remainder) / max(len(forces) - columns.shape[1], 1))
         spread = np.sqrt(np.diag(np.linalg.pinv(scaled.T @ scaled))[0]) / norms[used][0]
         error = float(deviation * spread / abs(numbers[0])) if numbers[0] != 0.0 else np.inf
     else:
@@ -156,7 +157,8 @@ def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
 
 
 def first_starts(windows: Windows, values: Floats, starts: Floats | None = None) -> Floats:
-    """Position and velocity (W, 2) at each window's first sample: of several guesses that which predicts it best.
+    """Position and velocity (W, 2) at each window's first sample: of several guesses that which predicts it best
+    by the numbers `values` (10,).
 
     The guesses are at rest, lines and parabolas through the first samples, and the given starts.
     """
@@ -167,6 +169,7 @@ def first_starts(windows: Windows, values: Floats, starts: Floats | None = None)
         n = np.minimum(np.maximum(reach, 1), (windows.length - 1) // 2)
         middle, end = windows.position[windows.first + n], windows.position[windows.first + 2 * n]
         span = 2.0 * np.maximum(n, 1) * windows.period
+        # velocity times 2 n periods, of the line, and of the parabola at its beginning
         for rise in (end - here, 4.0 * middle - 3.0 * here - end):
             guesses.append(np.stack([here, rise / span], axis=1))
     if starts is not None:
@@ -194,35 +197,42 @@ def search_guess(
     short = windows.cut(PARTS[0])
     enough = (GOOD * noise) ** 2 * float(np.sum(windows.length))
     best: tuple[JointNumbers, Floats, Floats] | None = None
-    for one in islice(_guesses(windows, numbers, step), most):
-        found = _followed(windows, short, approach(short, one, first_starts(short, one.values), 6))
-        squares = float(np.sum(found[2]))
-        again = best is not None and abs(squares / float(np.sum(best[2])) - 1.0) < ALIKE
+    for guess in islice(_guesses(windows, numbers, step), most):
+        found = _followed_to_whole_windows(
+            windows, short, approach(short, guess, first_starts(short, guess.values), 6)
+        )
+        squares = float(np.sum(found[2]))  # numbers, starts, sums of squares of the windows
+        same_place = best is not None and abs(squares / float(np.sum(best[2])) - 1.0) < ALIKE
         if best is None or squares < np.sum(best[2]):
             best = found
-        if again or squares <= enough:  # two guesses that lead to one place need no third
+        if same_place or squares <= enough:  # two guesses that lead to one place need no third
             break
     assert best is not None
     return best[0], best[1]
 
 
-def _followed(
+def _followed_to_whole_windows(
     windows: Windows, short: Windows, begun: tuple[JointNumbers, Floats, Floats]
 ) -> tuple[JointNumbers, Floats, Floats]:
     """Follow numbers, starts and sums of squares from short windows to the whole ones.
 
     While any whole window is badly predicted, at most TRIES times, all begin anew from these numbers.
+
+    short    the windows cut into parts;   begun  numbers, starts and sums of squares in these
+    Returns  numbers, starts (W, 2) and sums of squares (W,) in the whole windows
     """
     numbers, starts, squares = begun
-    before = short
+    shorter = short
     for parts in PARTS[1:]:
-        now = windows.cut(parts) if parts > 1 else windows
-        at = np.minimum(np.searchsorted(before.first, now.first), len(starts) - 1)
-        numbers, starts, squares = approach(now, numbers, first_starts(now, numbers.values, starts[at]), 10)
-        before = now
+        longer = windows.cut(parts) if parts > 1 else windows
+        nearest = np.minimum(np.searchsorted(shorter.first, longer.first), len(starts) - 1)
+        numbers, starts, squares = approach(
+            longer, numbers, first_starts(longer, numbers.values, starts[nearest]), 10
+        )
+        shorter = longer
     for _ in range(TRIES):
-        means = squares / windows.length
-        if not np.any(means > OUTLYING * np.median(means)):
+        mean_squares = squares / windows.length
+        if not np.any(mean_squares > OUTLYING * np.median(mean_squares)):
             break
         fresh = first_starts(windows, numbers.values, starts)
         numbers, starts, squares = approach(windows, numbers, fresh, 10)
@@ -236,19 +246,19 @@ def _guesses(windows: Windows, numbers: JointNumbers, step: float) -> Iterator[J
     size, spring = int(np.median(windows.length)), STIFFNESS in numbers.free
     lengths = [n for n in dict.fromkeys((size, size // 2, size // 4, size // 8, 2 * SHORTEST)) if n >= SHORTEST]
     found = [first_guess(windows, n, step, spring=spring) for n in lengths]
-    sure = sorted((one for one in found if one is not None), key=lambda one: -one.explained)
+    sure = sorted((guess for guess in found if guess is not None), key=lambda guess: -guess.explained)
     partly = [first_guess(windows, n, step, moving=PARTLY) for n in (SHORTEST, 2 * SHORTEST)]
-    values = [one.values for one in (*sure, *partly) if one is not None]
-    values += [_in_bursts(windows, share) for share in LEVELS] if windows.driven else []
+    values = [guess.values for guess in (*sure, *partly) if guess is not None]
+    values += [_numbers_of_bursts(windows, share) for share in LEVELS] if windows.driven else []
     for given in values or [np.eye(len(sizes))[MASS] * sizes]:
-        one = given[: len(numbers.values)].copy()
-        one[MASS] = max(one[MASS], 1e-3 * sizes[MASS])
-        one[VISCOUS] = np.maximum(one[VISCOUS], 0.0)
-        one[DRY] += max(-0.5 * float(np.sum(one[DRY])), 0.0)  # their mean is not below 0
-        yield numbers.with_free(bounded(one, windows)[list(numbers.free)])
+        guess = given[: len(numbers.values)].copy()
+        guess[MASS] = max(guess[MASS], 1e-3 * sizes[MASS])
+        guess[VISCOUS] = np.maximum(guess[VISCOUS], 0.0)
+        guess[DRY] += max(-0.5 * float(np.sum(guess[DRY])), 0.0)  # their mean is not below 0
+        yield numbers.with_free(bounded(guess, windows)[list(numbers.free)])
 
 
-def _in_bursts(windows: Windows, share: float) -> Floats:
+def _numbers_of_bursts(windows: Windows, share: float) -> Floats:
     """Numbers (10,) of a joint that stands until the force is above this share of all forces, and then moves in
     bursts of half a period of the force."""
     sizes = np.abs(windows.force[windows.rows])
@@ -258,8 +268,11 @@ def _in_bursts(windows: Windows, share: float) -> Floats:
     T = float(np.mean(windows.period))
     burst = 0.5 * len(signs) / turns * T
     short = windows.cut(max(int(np.median(windows.length) * T / (2.0 * burst)), 1))
-    way = np.array([np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)])
-    moved = max(float(np.quantile(way, 0.8)), 1e-300)
+    travels = np.array(
+        [np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)]
+    )
+    moved = max(float(np.quantile(travels, 0.8)), 1e-300)
+    # speeded up by the excess of force for half a burst, and slowed down by it: travel is excess burst^2 / (4 m)
     return np.array(
         [max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T, 0.0, 0.0, 0.0]
     )

@@ -51,7 +51,7 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
     limit       largest force that the device commands
     """
     names, label = source.channels, source.record.label
-    force, position = levels.span
+    force, position = levels.span  # and so are the entries 0 and 1 of all levels
     checks = list[Check]()
     if force == 0.0:
         value = levels.high[0] + 0.0  # no negative zero
@@ -105,7 +105,10 @@ def _saturation_check(source: Source, levels: Levels, limit: float) -> Check:
 
 
 def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
-    """Check that enough lines are excited; and which (n,) are."""
+    """Check that enough lines are excited.
+
+    Returns  the check, and which lines (n,) are excited
+    """
     power = spectra.power("force")
     excited = power > EXCITED * max(float(power.max(initial=0.0)), 1e-300)
     f = spectra.frequency[excited]
@@ -120,10 +123,11 @@ def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
 
 
 def coherence_check(spectra: Spectra, excited: Flags, closed: bool) -> tuple[Check, float]:
-    """Check that the position follows the force (closed: the reference); and the frequency above which the
-    coherence has collapsed for good [Hz], inf where it has not.
+    """Check that the position follows the force (closed: the reference).
 
     excited  (n,) lines with force
+    Returns  the check, and the frequency above which the coherence has collapsed for good [Hz]: inf where it has
+             not, 0 where the position follows nowhere
     """
     into = "reference" if closed else "force"
     coherence = np.where(excited, spectra.coherence(into, "position"), 0.0)
@@ -152,7 +156,7 @@ def coherence_check(spectra: Spectra, excited: Flags, closed: bool) -> tuple[Che
 
 def slope_of(spectra: Spectra) -> tuple[float, float]:
     """Exponent of |P| over frequency where the coherence is good, and the ratio of the frequencies that it is
-    taken over."""
+    taken over; 0 and 1 for fewer than eight lines."""
     value, coherence = spectra.response("force", "position"), spectra.coherence("force", "position")
     good = (coherence > TRUSTED) & (np.abs(value) > 0.0)
     f = spectra.frequency[good]
@@ -219,11 +223,11 @@ def sign_and_unit_checks(
     lowest = good[: max(4, len(good) // 8)]
     ratio = value[lowest] / own[lowest]
     size = float(np.median(np.abs(ratio)))
-    turned = float(np.median(np.cos(np.angle(ratio))))
+    cosine = float(np.median(np.cos(np.angle(ratio))))
     f = spectra.frequency[lowest]
     where = f"from {f[0]:.3g} to {f[-1]:.3g} Hz"
     checks = []
-    if turned < -0.7:
+    if cosine < -0.7:
         reason = f"{where} the position moves against the force; turn the sign of one of the columns"
         checks.append(Check("sign", False, reason))
     else:
@@ -250,17 +254,17 @@ def flip_check(gains: Sequence[tuple[str, float]]) -> Check:
 
     gains  what each stretch is, and how many times as far as by the first one's response it moves
     """
-    turned = [(what, g) for what, g in gains if g < FLIPPED]
+    turned = [(what, times) for what, times in gains if times < FLIPPED]
     if turned:
-        what, g = turned[0]
+        what, times = turned[0]
         reason = (
-            f"{what} moves {g:.2g} times as far as the first one does under the same force: the sign of force or "
-            "position was turned between the runs; turn it back, or leave the run out"
+            f"{what} moves {times:.2g} times as far as the first one does under the same force: the sign of force "
+            "or position was turned between the runs; turn it back, or leave the run out"
         )
         return Check("runs agree", False, reason)
     if len(gains) < 2:
         return Check("runs agree", True, "there is one stretch, and no other to compare it with")
-    least, most = (f(g for _, g in gains) for f in (min, max))
+    least, most = (extreme(times for _, times in gains) for extreme in (min, max))
     reason = f"all {len(gains)} stretches move as the first does, {least:.3g} to {most:.3g} times as far"
     return Check("runs agree", True, reason)
 
@@ -312,22 +316,22 @@ def amplitude_check(
 
     Returns  also the records that are not to be fitted: those of less force, where the response hangs on it
     """
-    size = np.array([one.deviation[0] for one in levels])
+    size = np.array([one.deviation[0] for one in levels])  # of the force
     if len(by_record) < 2 or size.max() < UNLIKE * size.min():
         reason = (
             "one amplitude only: Coulomb friction f_c looks like damping 4 f_c/(pi w X) at amplitude X, and at "
             "small motion like a spring; record a second time with twice the force, and give both files"
         )
         return Check("amplitude", False, reason, warning=True), frozenset()
-    small, large = int(np.argmin(size)), int(np.argmax(size))
-    a, b = by_record[small], by_record[large]
-    known = np.isfinite(a.deviation) & np.isfinite(b.deviation)
-    variance = a.deviation[known] ** 2 + b.deviation[known] ** 2
-    off = float(np.sum(np.abs(a.value[known] - b.value[known]) ** 2 / variance))
+    small, large = int(np.argmin(size)), int(np.argmax(size))  # records of the least and the largest force
+    of_small, of_large = by_record[small], by_record[large]
+    known = np.isfinite(of_small.deviation) & np.isfinite(of_large.deviation)
+    variance = of_small.deviation[known] ** 2 + of_large.deviation[known] ** 2
+    difference = float(np.sum(np.abs(of_small.value[known] - of_large.value[known]) ** 2 / variance))
     count = 2 * int(np.count_nonzero(known))
-    relative = float(np.median(np.abs(a.value[known] / b.value[known] - 1.0))) if count else 0.0
+    relative = float(np.median(np.abs(of_small.value[known] / of_large.value[known] - 1.0))) if count else 0.0
     forces = f"{size[small]:.3g} and {size[large]:.3g} {sources[0].channels.force.partition('_')[2]}"
-    if count == 0 or off < count + SURE * np.sqrt(2.0 * count):
+    if count == 0 or difference < count + SURE * np.sqrt(2.0 * count):
         return Check(
             "amplitude", True, f"the response is the same at {forces} (standard deviations of the force)"
         ), frozenset()
@@ -335,7 +339,7 @@ def amplitude_check(
     crest = np.array([np.max(np.abs([one.low[0], one.high[0]])) for one in levels]) / np.maximum(size, 1e-300)
     friction = ""
     if np.all(np.abs(crest[[small, large]] / np.sqrt(2.0) - 1.0) < SINE):
-        f_c = _friction(a, b, known, np.sqrt(2.0) * size[small], np.sqrt(2.0) * size[large])
+        f_c = _coulomb_friction(of_small, of_large, known, np.sqrt(2.0) * size[small], np.sqrt(2.0) * size[large])
         friction = f" of about {f_c:.2g} {sources[0].channels.force.partition('_')[2]}" if f_c > 0.0 else ""
     reason += (
         f"friction{friction}, or backlash; only the records of the largest force are fitted, in which it weighs "
@@ -345,7 +349,7 @@ def amplitude_check(
     return Check("amplitude", False, reason, warning=True), smaller
 
 
-def _friction(a: RecordResponse, b: RecordResponse, known: Flags, force_a: float, force_b: float) -> float:
+def _coulomb_friction(a: RecordResponse, b: RecordResponse, known: Flags, force_a: float, force_b: float) -> float:
     """Coulomb friction [N] by which two sine sweeps of unlike force differ, by least squares.
 
     a, b  their responses;   known  bands of both;   force_a, force_b  amplitudes F [N]
@@ -353,10 +357,10 @@ def _friction(a: RecordResponse, b: RecordResponse, known: Flags, force_a: float
     |1/P_a| - |1/P_b| along the direction of i z^d:   Im (1/P_a - 1/P_b) = 4 f_c/pi (1/X_a - 1/X_b),  X = |P| F
     """
     Pa, Pb = a.value[known], b.value[known]
-    wanted = 4.0 / np.pi * (1.0 / (np.abs(Pa) * force_a) - 1.0 / (np.abs(Pb) * force_b))
+    per_friction = 4.0 / np.pi * (1.0 / (np.abs(Pa) * force_a) - 1.0 / (np.abs(Pb) * force_b))
     found = np.imag(1.0 / Pa - 1.0 / Pb)
     weight = 1.0 / (a.deviation[known] / np.abs(Pa) ** 2) ** 2
-    return float(np.sum(weight * wanted * found) / max(float(np.sum(weight * wanted**2)), 1e-300))
+    return float(np.sum(weight * per_friction * found) / max(float(np.sum(weight * per_friction**2)), 1e-300))
 
 
 SEEN: Final = 25.0  # sum of squares, in the noise's variances, by which the hand must change the response
@@ -366,8 +370,10 @@ def hand_check(data: RecordResponse, model: SampledModel, point: OperatingPoint)
     """Check that a hand as in the file changes the response by more than the noise."""
     alone = sampled_response(without_hand(point), data.theta)
     held = model.response(model.vector(model.start), data.theta)
-    seen = float(np.sum(data.apply(held - alone) ** 2))
-    reason = f"a hand as in the file changes the response by {np.sqrt(seen):.3g} standard deviations of its noise"
-    if seen < SEEN:
+    change = float(np.sum(data.apply(held - alone) ** 2))
+    reason = (
+        f"a hand as in the file changes the response by {np.sqrt(change):.3g} standard deviations of its noise"
+    )
+    if change < SEEN:
         reason += ": the device hides the hand; drive it harder, or at frequencies at which the handle moves"
-    return Check("hand", seen >= SEEN, reason)
+    return Check("hand", change >= SEEN, reason)

@@ -59,7 +59,7 @@ from zwidth.identify.modes.overview import (
     Spectra,
     Survey,
     averaged_spectra,
-    peaks,
+    peak_poles,
     periodic_lines,
     survey_of,
 )
@@ -117,7 +117,7 @@ def identify_modes(
     point = device.at() if point is None else point
     _check_options(device, records, fitted, estimator, segment)
     numbers = model_of(device, point, paths) if fitted == "device" else None
-    sources, checks = _sources(device, point, records)
+    sources, checks = _checked_sources(device, point, records)
     if result := refused("modes", device.label, checks):
         return result
     survey = survey_of(sources, segment, progress)
@@ -133,12 +133,13 @@ def identify_modes(
             "longer"
         )
         return Identification("modes", device.label, (*checks, Check("duration", False, reason)))
+    # the first number of the vector is the delay [samples]
     if pilot.vector[0] < SHIFTED and pilot.misfit < MISFIT:
         checks.append(shift_check(float(pilot.vector[0]), float(pilot.vector[0]), 1.0))
         return Identification("modes", device.label, tuple(checks))
     check, data.dropped = amplitude_check(data.by_record(pilot), sources, survey.levels)
     checks.append(check)
-    return _fitted(device, point, numbers, data, pilot, checks, survey, seen)
+    return _identified(device, point, numbers, data, pilot, checks, survey, seen)
 
 
 def _check_options(
@@ -165,7 +166,9 @@ def _check_options(
         raise fail(device.label, "estimator", "joint needs a column reference_N or reference_Nm")
 
 
-def _sources(device: Device, point: OperatingPoint, records: Sequence[Record]) -> tuple[list[Source], list[Check]]:
+def _checked_sources(
+    device: Device, point: OperatingPoint, records: Sequence[Record]
+) -> tuple[list[Source], list[Check]]:
     """The records with a regular sampling as sources, kept in memory where they are short; the check of each."""
     sources, checks = list[Source](), list[Check]()
     for record in records:
@@ -219,19 +222,19 @@ def _check_survey(
     loudest = sources[survey.loudest[0]].first()
     assert loudest is not None
     both = {"force": loudest.force, "position": loudest.position}  # differenced alike: neither is known to drift
-    alike = averaged_spectra([both], spectra.period, spectra.length, dict.fromkeys(both, 2))
-    checks.append(order_check(*slope_of(alike), names))
+    differenced = averaged_spectra([both], spectra.period, spectra.length, dict.fromkeys(both, 2))
+    checks.append(order_check(*slope_of(differenced), names))
     checks.append(flip_check(survey.agreement))
     if not all(check.passed for check in checks[-2:]):  # all else would be said of what is not so
         return _Seen(checks, chosen, value, coherence, excited, 0.0)
-    checks.append(_feedback_or_reference(point, loudest, spectra.period, closed))
+    checks.append(_check_feedback_or_reference(point, loudest, spectra.period, closed))
     checks.append(_input_check(sources[0].channels))
     check, top = coherence_check(spectra, excited, closed)
     checks.append(check)
     if checks[-1].passed or checks[-1].warning:
         theta = 2.0 * np.pi * spectra.frequency * spectra.period
-        own = sampled_response(point.loop, np.minimum(theta, np.pi))
-        checks += sign_and_unit_checks(spectra, excited, value, own, sources[0].channels.turns)
+        of_device = sampled_response(point.loop, np.minimum(theta, np.pi))
+        checks += sign_and_unit_checks(spectra, excited, value, of_device, sources[0].channels.turns)
     return _Seen(checks, chosen, value, coherence, excited, top)
 
 
@@ -253,7 +256,7 @@ def _checks_of_levels(
     return checks
 
 
-def _feedback_or_reference(point: OperatingPoint, loudest: Stretch, period: float, closed: bool) -> Check:
+def _check_feedback_or_reference(point: OperatingPoint, loudest: Stretch, period: float, closed: bool) -> Check:
     """Check that no loop centres the device, or that its reference is recorded (closed); period [s]."""
     squared, _ = undamped_modes(point.plant.mass, point.plant.stiffness)
     if closed:
@@ -274,7 +277,7 @@ def _input_check(channels: Channels) -> Check:
     return Check("input", True, text)
 
 
-def _fitted(
+def _identified(
     device: Device,
     point: OperatingPoint,
     numbers: SampledModel | None,
@@ -291,6 +294,7 @@ def _fitted(
     """
     response, unseen_part, modal = _banded_fit(data, pilot)
     rough, _ = modal_intervals(response, modal, profiled=False)
+    # the first number is the delay [samples]
     checks.append(shift_check(float(rough.low[0]), float(rough.high[0]), modal.misfit))
     checks.append(resolution_check(modal, data.line))
     if numbers is not None and numbers.hand:
@@ -313,7 +317,7 @@ def _fitted(
     fitted = modal.response if found is None or numbers is None else partial(numbers.response, found.fit.values)
     curves = _curves(survey.spectra, seen, fitted)
     share = explained_share(unseen_part, fitted)
-    if _clipped(checks, data.sources) and share < FOLLOWED:
+    if _force_is_clipped(checks, data.sources) and share < FOLLOWED:
         return Identification("modes", device.label, (*checks, _unfollowed_check(share)))
     text = f"{data.unseen}, predicted from its force"
     return Identification(
@@ -329,7 +333,7 @@ def _banded_fit(data: FittedData, pilot: ModalFit) -> tuple[RecordResponse, Band
     modal = pilot
     for _ in range(MOST_ROUNDS):
         before = modal.poles
-        seen_part, unseen_part = data.sums(data.where(before), None, data.where(before, unseen=True))
+        seen_part, unseen_part = data.sums(data.bands_about(before), None, data.bands_about(before, unseen=True))
         response = response_in_bands(seen_part)
         modal = fit_modes(response, data.period, modal)
         data.noise = response.noise
@@ -357,7 +361,10 @@ def _model_and_damping(
 
 
 def _details(seen: _Seen, survey: Survey, difference: float, misfit: float, turns: bool) -> dict[str, Any]:
-    """Give the spectra's and the modes' numbers by key; `difference` is that of the criterion by the damping."""
+    """Give the spectra's and the modes' numbers by key; `difference` is that of the criterion by the damping.
+
+    misfit  of the modes;   turns  the motion is a turn, under a torque
+    """
     return {
         "estimator": seen.estimator,
         "averages": survey.spectra.averages,
@@ -376,7 +383,7 @@ def _unfollowed_check(share: float) -> Check:
     return Check("validation", False, reason)
 
 
-def _clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
+def _force_is_clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
     """Whether a force has flat tops and is none that steps between a few levels on purpose."""
     if all(check.passed for check in checks if check.what == "saturation"):
         return False
@@ -407,9 +414,9 @@ def _damping_remark(difference: float) -> str:
 
 def _misfit_check(found: PhysicalFit, numbers: SampledModel, response: RecordResponse, period: float) -> Check:
     """Warn that the device's model leaves more than the noise, and near which frequency most; period [s]."""
-    own = numbers.response(found.fit.values, 2.0 * np.pi * response.middle * period)
-    off = np.abs(own - response.value) / response.deviation
-    worst = float(response.middle[int(np.nanargmax(off))])
+    modelled = numbers.response(found.fit.values, 2.0 * np.pi * response.middle * period)
+    deviations = np.abs(modelled - response.value) / response.deviation
+    worst = float(response.middle[int(np.nanargmax(deviations))])
     reason = (
         f"the device's model leaves {found.misfit:.3g} times the noise, most near {worst:.4g} Hz: friction, "
         "another mode, or a stiffness that changes with load is not in it; the intervals are widened by that "
@@ -470,55 +477,59 @@ class FittedData:
     @property
     def line(self) -> float:
         """Distance of two lines of the transform of the longest stretch [Hz]."""
-        share = 1.0 - (1.0 / UNSEEN if self._cut else 0.0)
+        share = 1.0 - (1.0 / UNSEEN if self._ends_unseen else 0.0)
         return 1.0 / (self.survey.longest * share * self.period)
 
     @property
-    def _whole(self) -> bool:
+    def _whole_stretches_unseen(self) -> bool:
         """Whether whole stretches, the last fourth of them, are for the validation."""
         return self.survey.covered and self.survey.stretches >= 2 * UNSEEN
 
     @property
-    def _cut(self) -> bool:
+    def _ends_unseen(self) -> bool:
         """Whether the last part of each stretch is for the validation."""
-        return self.survey.covered and not self._whole
+        return self.survey.covered and not self._whole_stretches_unseen
 
     @property
     def unseen(self) -> str:
         """The part of the records that the validation is made on, in words."""
-        if self._whole:
+        if self._whole_stretches_unseen:
             return "the last fourth of the stretches"
-        if self._cut:
+        if self._ends_unseen:
             return "the last fourth of each stretch"
         return "every fourth line of the transform, as the record excites each frequency only once"
 
     def parts(self, only: tuple[int, int] | None = None) -> Iterator[tuple[int, str, Lines, Lines | None]]:
-        """Record, name, and lines for the fit and for the validation, of each stretch; None: all of it is for the
-        other.
+        """Number of the record, name, lines for the fit, and lines for the validation, of each stretch: none for
+        the fit where the whole stretch is for the validation, None for the validation where it is for the fit.
 
         only  record and number of a single stretch; None: all
         """
-        n, last = 0, self.survey.stretches - self.survey.stretches // UNSEEN
-        for k, source in enumerate(self.sources):
-            if k in self.dropped:
+        number, fitted = 0, self.survey.stretches - self.survey.stretches // UNSEEN
+        for record, source in enumerate(self.sources):
+            if record in self.dropped:
                 continue
-            for i, stretch in enumerate(source.stretches()):
-                if only is not None and (k, i) != only:
-                    n += 1
+            for index, stretch in enumerate(source.stretches()):
+                if only is not None and (record, index) != only:
+                    number += 1
                     continue
-                label = source.record.label + (f", stretch {i + 1}" if i or self.survey.stretches > 1 else "")
+                label = source.record.label + (
+                    f", stretch {index + 1}" if index or self.survey.stretches > 1 else ""
+                )
                 cut = len(stretch.force) - len(stretch.force) // UNSEEN
-                if self._whole:
+                if self._whole_stretches_unseen:
                     lines = self._lines(stretch)
-                    yield (k, label, lines, None) if n < last else (k, label, lines.nothing, lines)
-                elif self._cut:
-                    yield k, label, self._lines(stretch, 0, cut), self._lines(stretch, cut, None)
+                    yield (
+                        (record, label, lines, None) if number < fitted else (record, label, lines.nothing, lines)
+                    )
+                elif self._ends_unseen:
+                    yield record, label, self._lines(stretch, 0, cut), self._lines(stretch, cut, None)
                 else:
                     lines = self._lines(stretch)
-                    yield k, label, lines.without(UNSEEN - 1, UNSEEN), lines.only(UNSEEN - 1, UNSEEN)
-                n += 1
+                    yield record, label, lines.without(UNSEEN - 1, UNSEEN), lines.only(UNSEEN - 1, UNSEEN)
+                number += 1
                 if self.progress is not None:
-                    self.progress("transforming records", n, self.survey.stretches)
+                    self.progress("transforming records", number, self.survey.stretches)
 
     def _lines(self, stretch: Stretch, first: int = 0, last: int | None = None) -> Lines:
         """Lines of the samples `first` to `last`, this one not included, of a stretch."""
@@ -526,13 +537,23 @@ class FittedData:
         reference = None if stretch.reference is None else stretch.reference[part]
         return transformed(stretch.force[part], stretch.position[part], reference, self.period)
 
-    def where(self, poles: Complexes, singles: int = 0, unseen: bool = False) -> list[FrequencyBand]:
+    def bands_about(self, poles: Complexes, singles: int = 0, unseen: bool = False) -> list[FrequencyBand]:
         """Bands about these poles; the first `singles` lines, at most half of all, one by one.
 
         unseen  for the validation, whose lines lie farther apart
         """
         high = min(ALMOST * 0.5 / self.period, self.top)
-        apart = 1.0 if self._whole else UNSEEN if unseen else 1.0 if self._cut else UNSEEN / (UNSEEN - 1.0)
+        # distance of the part's lines over `line`: that of a fourth of each stretch, and of every fourth line, is
+        # fourfold, and that of all lines but every fourth one 4/3 in the mean
+        apart = (
+            1.0
+            if self._whole_stretches_unseen
+            else UNSEEN
+            if unseen
+            else 1.0
+            if self._ends_unseen
+            else UNSEEN / (UNSEEN - 1.0)
+        )
         line = self.line * apart
         return bands(self.line, high, line, poles, self.period, min(singles * line, 0.5 * high))
 
@@ -560,28 +581,32 @@ class FittedData:
     def pilot(self) -> ModalFit | None:
         """The modes of the stretch with the largest force, from which the bands are chosen; None where it is too
         short."""
-        poles = peaks(self.survey.spectra)
-        loudest = None if self._whole and self.survey.loudest[1] else self.survey.loudest
-        fit = None
+        poles = peak_poles(self.survey.spectra)
+        # a stretch behind the first may be one that no fit is to see: then all that are fitted are taken
+        loudest = None if self._whole_stretches_unseen and self.survey.loudest[1] else self.survey.loudest
+        modes = None
         for most in (1, 3, MOST_MODES):
-            where = self.where(poles, UNKNOWN)
+            where = self.bands_about(poles, UNKNOWN)
             if len([band for band in where if not band.single]) < 4:
                 return None
             try:
-                for _ in range(2 if fit is None else 1):
+                for _ in range(2 if modes is None else 1):  # a second time, weighed by the noise of the first
                     data = response_in_bands(self.sums(where, loudest)[0])
                     self.noise = data.noise
             except ValueError:
                 return None
-            fit = fit_modes(data, self.period, fit, most)
-            if len(fit.poles) and self.settled(poles, fit.poles):
+            modes = fit_modes(data, self.period, modes, most)
+            if len(modes.poles) and self.settled(poles, modes.poles):
                 break
-            poles = fit.poles
-        return fit
+            poles = modes.poles
+        return modes
 
     def settled(self, before: Complexes, after: Complexes) -> bool:
         """Whether poles have moved so little that the bands about them are right; and always where reading the
-        records again takes long."""
+        records again takes long.
+
+        before, after  (p,) poles [1/s]
+        """
         if self.sources[0].kept is None:
             return True
         moved = np.min(np.abs(after[:, None] - before), axis=1, initial=np.inf)
@@ -591,7 +616,7 @@ class FittedData:
         """The response of each record by itself; [] of a single one."""
         if len(self.sources) < 2:
             return []
-        where = self.where(pilot.poles)
+        where = self.bands_about(pilot.poles)
         found = []
         for k in range(len(self.sources)):
             alone = replace(self, dropped=frozenset(range(len(self.sources))) - {k})

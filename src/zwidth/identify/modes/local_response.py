@@ -81,9 +81,9 @@ def bands(
     poles    in continuous time [1/s], of either sign of their imaginary part
     singles  frequency [Hz] up to which lines are kept one by one, as poles are not known there yet
     """
-    at = np.abs(np.imag(poles)) / (2.0 * np.pi)
+    natural = np.abs(np.imag(poles)) / (2.0 * np.pi)
     nyquist = 0.5 / period
-    folded = np.abs((at + nyquist) % (2.0 * nyquist) - nyquist)
+    folded = np.abs((natural + nyquist) % (2.0 * nyquist) - nyquist)
     width = np.abs(np.real(poles)) / (2.0 * np.pi)
     least = FEWEST * line
 
@@ -93,35 +93,42 @@ def bands(
 
     edges = np.arange(low, min(max(singles, LOWEST * line), 0.5 * high), BLOCK * line)
     ends = edges + BLOCK * line
-    found = [
+    laid = [
         FrequencyBand(float(a), float(b), True, about(a, b), singles > 0.0)
         for a, b in zip(edges, ends, strict=True)
     ]
-    f = found[-1].high if found else low
-    while f < high - 0.5 * least:
-        most = min(max(WIDEST * f, least), max(OF_NYQUIST * nyquist, least))
+    reached = laid[-1].high if laid else low
+    while reached < high - 0.5 * least:
+        most = min(max(WIDEST * reached, least), max(OF_NYQUIST * nyquist, least))
+        # poles here that are narrower than the least band, about which lines are kept one by one
         single = [
             i
-            for i in range(len(at))
-            if width[i] < least / NEAR and folded[i] - least / NEAR < f + least and folded[i] + least / NEAR > f
+            for i in range(len(natural))
+            if width[i] < least / NEAR
+            and folded[i] - least / NEAR < reached + least
+            and folded[i] + least / NEAR > reached
         ]
-        if single and len(at):
-            i = min(single, key=lambda i: abs(folded[i] - f))
+        if single and len(natural):
+            i = min(single, key=lambda i: abs(folded[i] - reached))
             end = min(folded[i] + least / NEAR, high)
-            if end > f:
-                found.append(FrequencyBand(f, end, True, about(f, end)))
-                f = end
+            if end > reached:
+                laid.append(FrequencyBand(reached, end, True, about(reached, end)))
+                reached = end
                 continue
-        step = most
+        step = most  # shortened until the band is narrow beside its distance to the nearest pole
         for _ in range(20):
-            middle = f + 0.5 * step
+            middle = reached + 0.5 * step
             distance = float(np.min(np.hypot(folded - middle, width), initial=np.inf))
             if step <= max(NEAR * distance, least):
                 break
             step = max(0.8 * step, least)
-        found.append(FrequencyBand(f, min(f + step, high), False, about(f, min(f + step, high), 2.0 * step)))
-        f += step
-    return found
+        laid.append(
+            FrequencyBand(
+                reached, min(reached + step, high), False, about(reached, min(reached + step, high), 2.0 * step)
+            )
+        )
+        reached += step
+    return laid
 
 
 @dataclass
@@ -191,11 +198,12 @@ class BandedRecord:
         f = lines.frequency[a:e]
         U, Y, R = (part[a:e] for part in (lines.force, lines.position, lines.reference))
         weight = 1.0 / np.sqrt(self.noise(f) / self.noise(band.middle))
-        x = (f - band.middle) / (0.5 * (band.high - band.low))
-        L = legendre.legvander(x, DEGREE) * weight[:, None]
+        place = (f - band.middle) / (0.5 * (band.high - band.low))
+        L = legendre.legvander(place, DEGREE) * weight[:, None]
         ringing = self._ringing(band, f) * weight[:, None]
         if e - a < FEWEST + 4 * len(band.poles):
             ringing = ringing[:, :0]  # too few lines to give some to them
+        # Legendre polynomials L times force are the regressors, and the transient is what is projected out
         across = _basis(L[:, : TRANSIENT + 1], ringing)
         X, y = U[:, None] * L, Y * weight
         X, y = X - across @ (across.conj().T @ X), y - across @ (across.conj().T @ y)
@@ -219,21 +227,21 @@ class BandedRecord:
         if e - a < SMOOTH + 5 + 4 * len(band.poles) or (self.reference and not band.search):
             return  # feedback would bias single lines: they serve to look for the poles alone
         f, U, Y = lines.frequency[a:e], lines.force[a:e], lines.position[a:e]
-        x = (f - band.middle) / (0.5 * (band.high - band.low))
+        place = (f - band.middle) / (0.5 * (band.high - band.low))
         z = np.exp(2j * np.pi * f * self.period)
         ringing = self._ringing(band, f)
         # what transients of unknown poles leave must not weigh at the lowest lines
         flat = np.full(len(f), float(self.noise(band.high)))
         weight = 1.0 / np.sqrt(flat if band.search and not band.poles else self.noise(f))
-        across = _basis(legendre.legvander(x, SMOOTH) * weight[:, None], ringing * weight[:, None])
+        across = _basis(legendre.legvander(place, SMOOTH) * weight[:, None], ringing * weight[:, None])
         q, _ = np.linalg.qr(across, mode="complete")
-        rest = q[:, across.shape[1] :].conj().T * weight
-        y, matrix = rest @ Y, rest * (U * (z - 1.0) ** 2)
+        projection = q[:, across.shape[1] :].conj().T * weight
+        y, matrix = projection @ Y, projection * (U * (z - 1.0) ** 2)
         self.sums.rows.append((b, y, f, matrix))
         # what no smooth P with these poles makes of the lines is noise
-        known = _basis((rest * U) @ legendre.legvander(x, DEGREE), (rest * U) @ ringing)
-        left = float(np.sum(np.abs(y - known @ (known.conj().T @ y)) ** 2) + EXACT * np.sum(np.abs(y) ** 2))
-        self.sums.power[b] += left * float(self.noise(band.middle))
+        known = _basis((projection * U) @ legendre.legvander(place, DEGREE), (projection * U) @ ringing)
+        remainder = float(np.sum(np.abs(y - known @ (known.conj().T @ y)) ** 2) + EXACT * np.sum(np.abs(y) ** 2))
+        self.sums.power[b] += remainder * float(self.noise(band.middle))
         self.sums.lines[b] += max(len(y) - known.shape[1], 0)
 
     def _ringing(self, band: FrequencyBand, frequency: Floats) -> Complexes:
@@ -280,8 +288,8 @@ class NoiseCurve:
     def __call__(self, frequency: Floats | float) -> Floats:
         """Power (...) in lines of the twice differenced position at frequencies (...) [Hz]."""
         f = np.asarray(frequency, dtype=float)
-        own = np.exp(np.interp(np.log(f), np.log(self.frequency), np.log(self.power)))
-        return np.asarray(own * differenced_twice(f, self.period))
+        of_position = np.exp(np.interp(np.log(f), np.log(self.frequency), np.log(self.power)))
+        return np.asarray(of_position * differenced_twice(f, self.period))
 
 
 def differenced_twice(frequency: Floats | float, period: float) -> Floats:
@@ -319,11 +327,11 @@ class Lines:
         return self.where(np.zeros(len(self.frequency), dtype=bool))
 
     def without(self, remainder: int, modulus: int) -> Lines:
-        """All lines but those whose number leaves this remainder."""
+        """All lines but those whose number leaves this remainder over the modulus."""
         return self.where(np.arange(len(self.frequency)) % modulus != remainder)
 
     def only(self, remainder: int, modulus: int) -> Lines:
-        """The lines whose number leaves this remainder: every modulus-th one."""
+        """The lines whose number leaves this remainder over the modulus: every modulus-th one."""
         return self.where(np.arange(len(self.frequency)) % modulus == remainder)
 
 
@@ -393,17 +401,18 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
     """The map of the sums in `record`.
 
     The noise of a band is what the five numbers leave of its lines, averaged over a few bands about it.
+    Raises ValueError  where no band has lines enough
     """
     sums, where = record.sums, record.where
     used = np.array([b for b, band in enumerate(where) if not band.single and sums.lines[b] > TERMS], dtype=int)
     if not len(used):
         raise ValueError("no band has lines enough")
-    values, weights, rests, counts = [], [], [], []
+    values, weights, remainders, counts = [], [], [], []
     for b in used:
-        value, weight, rest, rank = _solve_band(sums, int(b), record.reference)
+        value, weight, remainder, rank = _solve_band(sums, int(b), record.reference)
         values.append(value)
         weights.append(weight)
-        rests.append(max(rest, EXACT * sums.power[b]))
+        remainders.append(max(remainder, EXACT * sums.power[b]))
         counts.append(max(sums.lines[b] - rank, 1.0))
     middle = np.array([where[b].middle for b in used])
     single_bands = [b for b, band in enumerate(where) if band.single and not band.search and sums.lines[b] > 0]
@@ -411,7 +420,7 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
     order = np.argsort(every)
     noise = _noise(
         every[order],
-        np.append(rests, sums.power[single_bands])[order],
+        np.append(remainders, sums.power[single_bands])[order],
         np.append(counts, sums.lines[single_bands])[order],
         record.period,
     )
@@ -419,8 +428,10 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
     nodes = middle[:, None] + half[:, None] * NODES
     z = np.exp(2j * np.pi * nodes * record.period)
     banded, targets, at_middle, deviation = [], [], [], []
-    flat = legendre.legvander(np.zeros(1), DEGREE)[0]
+    # Legendre polynomials at the band's middle
+    at_zero = legendre.legvander(np.zeros(1), DEGREE)[0]
     for i in range(len(used)):
+        # the root of the information over the noise makes rows whose errors have unit variance, real and imaginary
         sigma2 = float(noise(middle[i]))
         size, axes = np.linalg.eigh(weights[i])
         kept = size > WEAKEST * size[-1]
@@ -428,17 +439,19 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
         rows = root[:, None] * axes.conj().T
         banded.append(rows @ TO_LEGENDRE * (z[i] - 1.0) ** 2)
         targets.append((rows @ values[i])[kept])
+        # without a model: the polynomial at the middle, its differences undone
         spread = (
-            np.abs(axes.T @ flat) ** 2 / np.where(kept, size, np.inf) if kept.all() else np.full(TERMS, np.nan)
+            np.abs(axes.T @ at_zero) ** 2 / np.where(kept, size, np.inf) if kept.all() else np.full(TERMS, np.nan)
         )
         factor = np.abs(np.exp(2j * np.pi * middle[i] * record.period) - 1.0) ** 2
-        at_middle.append(flat @ values[i] / (np.exp(2j * np.pi * middle[i] * record.period) - 1.0) ** 2)
+        at_middle.append(at_zero @ values[i] / (np.exp(2j * np.pi * middle[i] * record.period) - 1.0) ** 2)
         deviation.append(np.sqrt(0.5 * sigma2 * float(np.sum(spread))) / factor)
     theta, single = [2.0 * np.pi * record.period * nodes.ravel()], []
     start = nodes.size
     for b, y, f, matrix in sums.rows:
-        at = where[b].high if where[b].search and not where[b].poles else where[b].middle
-        root = np.sqrt(2.0 * float(record.noise(at) / noise(at)))
+        # single lines stand there with the noise that they were added with: now with that of these bands
+        frequency = where[b].high if where[b].search and not where[b].poles else where[b].middle
+        root = np.sqrt(2.0 * float(record.noise(frequency) / noise(frequency)))
         single.append((slice(start, start + len(f)), matrix * root))
         targets.append(y * root)
         theta.append(2.0 * np.pi * record.period * f)
@@ -459,21 +472,24 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
 
 def _solve_band(sums: BandSums, b: int, reference: bool) -> tuple[Complexes, Complexes, float, int]:
     """Coefficients (5,) of (z - 1)^2 P in a band, their information matrix for noise of power 1 (5, 5), the power
-    of what they leave, and how many of them the lines tell."""
+    of what they leave, and how many of them the lines tell.
+
+    b  index of the band;   reference  whether one stands in for the regressors
+    """
     if not reference:
         weight = 0.5 * (sums.information[b] + sums.information[b].conj().T)
         inverse, rank = _inverse(weight)
         value = inverse @ sums.moment[b]
-        rest = sums.power[b] - float(np.real(np.vdot(value, sums.moment[b])))
-        return value, weight, rest, rank
+        remainder = sums.power[b] - float(np.real(np.vdot(value, sums.moment[b])))
+        return value, weight, remainder, rank
     inverse, _ = _inverse(sums.instruments[b])
     weight = sums.information[b].conj().T @ inverse @ sums.information[b]
     weight = 0.5 * (weight + weight.conj().T)
-    own, rank = _inverse(weight)
-    value = own @ sums.information[b].conj().T @ inverse @ sums.moment[b]
+    inverse_weight, rank = _inverse(weight)
+    value = inverse_weight @ sums.information[b].conj().T @ inverse @ sums.moment[b]
     crossed = float(np.real(np.vdot(value, sums.crossed[b])))
-    rest = sums.power[b] - 2.0 * crossed + float(np.real(np.vdot(value, sums.regressors[b] @ value)))
-    return value, weight, rest, rank
+    remainder = sums.power[b] - 2.0 * crossed + float(np.real(np.vdot(value, sums.regressors[b] @ value)))
+    return value, weight, remainder, rank
 
 
 def _inverse(matrix: Complexes) -> tuple[Complexes, int]:
@@ -486,29 +502,32 @@ def _inverse(matrix: Complexes) -> tuple[Complexes, int]:
     return (axes * inverse) @ axes.conj().T, int(np.count_nonzero(kept))
 
 
-def _noise(middle: Floats, rests: Floats, counts: Floats, period: float) -> NoiseCurve:
+def _noise(middle: Floats, remainders: Floats, counts: Floats, period: float) -> NoiseCurve:
     """The noise of bands from what is left in them, each averaged over some 300 lines of its neighbours.
 
-    middle  (b,) ascending [Hz];   rests, counts  (b,) power that is left, and lines in which it is
+    middle              (b,) ascending [Hz]
+    remainders, counts  (b,) power that is left, and lines in which it is
 
     The logarithm of a mean of c exponential powers is by psi(c) - ln c too low, and has the variance 1/c. A slope
     over frequency is followed where it is clear, and goes on below the lowest band.
     """
     from scipy.special import digamma
 
-    own = np.maximum(rests / counts / differenced_twice(middle, period), LEAST)
-    level, x = np.log(own) - digamma(counts) + np.log(counts), np.log(middle)
-    smooth, slope = np.empty(len(own)), 0.0
-    for i in reversed(range(len(own))):
+    power = np.maximum(remainders / counts / differenced_twice(middle, period), LEAST)
+    level, x = np.log(power) - digamma(counts) + np.log(counts), np.log(middle)
+    smooth, slope = np.empty(len(power)), 0.0
+    for i in reversed(range(len(power))):
         near = 1
-        while near < len(own) and np.sum(counts[max(i - near, 0) : i + near + 1]) < NEIGHBOURS:
+        while near < len(power) and np.sum(counts[max(i - near, 0) : i + near + 1]) < NEIGHBOURS:
             near += 1
         part = slice(max(i - near, 0), i + near + 1)
-        w, about = counts[part], x[part] - np.average(x[part], weights=counts[part])
-        spread = float(np.sum(w * about**2))
-        slope = float(np.sum(w * about * level[part])) / max(spread, 1e-300)
+        weights, about = counts[part], x[part] - np.average(x[part], weights=counts[part])
+        spread = float(np.sum(weights * about**2))
+        slope = float(np.sum(weights * about * level[part])) / max(spread, 1e-300)
         slope = slope if abs(slope) * np.sqrt(spread) > CLEAR else 0.0
-        smooth[i] = np.average(level[part], weights=w) + slope * (x[i] - np.average(x[part], weights=w))
+        smooth[i] = np.average(level[part], weights=weights) + slope * (
+            x[i] - np.average(x[part], weights=weights)
+        )
     first = smooth[0] + np.clip(slope, -STEEPEST, STEEPEST) * np.log(BELOW)
     return NoiseCurve(np.append(BELOW * middle[0], middle), np.exp(np.append(first, smooth)), period)
 
@@ -517,24 +536,29 @@ def explained_share(unseen: BandedRecord, response: Callable[[Floats], Complexes
     """Share of the motion in lines that a response explains: 1 less the power of what it leaves over that of the
     position, both with the transients projected out; nan where there are no lines."""
     sums, T = unseen.sums, unseen.period
-    left, whole = 0.0, 0.0
+    remains, whole = 0.0, 0.0
     used = [b for b, band in enumerate(unseen.where) if not band.single and sums.lines[b] > 0]
     if used:
         middle = np.array([unseen.where[b].middle for b in used])
         half = np.array([0.5 * (unseen.where[b].high - unseen.where[b].low) for b in used])
         theta = 2.0 * np.pi * T * (middle[:, None] + half[:, None] * NODES)
         P = response(theta.ravel()).reshape(theta.shape) * (np.exp(1j * theta) - 1.0) ** 2
-        p = P @ TO_LEGENDRE.T
+        coefficients = P @ TO_LEGENDRE.T
         square = sums.regressors if unseen.reference else sums.information
         crossed = sums.crossed if unseen.reference else sums.moment
         scale = 1.0 / differenced_twice(middle, T)  # from differences to the motion itself
-        for i, b in enumerate(used):
-            fitted = float(np.real(np.vdot(p[i], square[b] @ p[i]) - 2.0 * np.vdot(p[i], crossed[b])))
-            left += scale[i] * (sums.power[b] + fitted)
+        for i, b in enumerate(used):  # |Y - X p|^2 less |Y|^2
+            fitted = float(
+                np.real(
+                    np.vdot(coefficients[i], square[b] @ coefficients[i])
+                    - 2.0 * np.vdot(coefficients[i], crossed[b])
+                )
+            )
+            remains += scale[i] * (sums.power[b] + fitted)
             whole += scale[i] * sums.power[b]
     for _, y, f, matrix in sums.rows:
         theta = 2.0 * np.pi * T * f
         scale_of_line = float(unseen.noise(float(np.mean(f))) / differenced_twice(float(np.mean(f)), T))
-        left += scale_of_line * float(np.sum(np.abs(y - matrix @ response(theta)) ** 2))
+        remains += scale_of_line * float(np.sum(np.abs(y - matrix @ response(theta)) ** 2))
         whole += scale_of_line * float(np.sum(np.abs(y) ** 2))
-    return 1.0 - left / whole if whole > 0.0 else float("nan")
+    return 1.0 - remains / whole if whole > 0.0 else float("nan")

@@ -87,10 +87,11 @@ class ModalFit:
     def clear_rates(self) -> Floats:
         """w of the modes that are peaks of the response, ascending [rad/s]."""
         rates, shift = self.rates, 0 if self.base == "grounded" else 1
-        own = np.abs(self.residues[shift : shift + self.count]) / (2.0 * self.ratios * rates**2)
+        # size of the response at a resonance, by the mode alone and of all modes
+        by_mode = np.abs(self.residues[shift : shift + self.count]) / (2.0 * self.ratios * rates**2)
         inside = rates * self.period < np.pi
-        whole = np.abs(self.response(np.minimum(rates * self.period, np.pi)))
-        return np.sort(rates[(own > 0.5 * whole) & inside])
+        of_all = np.abs(self.response(np.minimum(rates * self.period, np.pi)))
+        return np.sort(rates[(by_mode > 0.5 * of_all) & inside])
 
     @property
     def delay(self) -> float:
@@ -137,28 +138,32 @@ def fit_modes(
     near  modes that are known to be about right, to begin with; None: none
     """
     if near is None:
-        starts = (_solved(data, "free", period, np.array([d])) for d in FIRST_DELAYS)
-        best = _refined(data, min(starts, key=lambda fit: fit.chi_squared))
+        starts = (_residues_solved(data, "free", period, np.array([d])) for d in FIRST_DELAYS)
+        best = _poles_refined(data, min(starts, key=lambda fit: fit.chi_squared))
     else:
-        best = _pruned(data, _refined(data, near))
+        best = _pruned(data, _poles_refined(data, near))
     while best.count < most:
         delays = (float(best.vector[0]), *(FIRST_DELAYS if best.count == 0 else ()))
-        tried = [one for d in delays for one in _with_mode(data, replace(best, vector=np.r_[d, best.vector[1:]]))]
+        tried = [
+            one
+            for d in delays
+            for one in _with_one_more_mode(data, replace(best, vector=np.r_[d, best.vector[1:]]))
+        ]
         tried.sort(key=lambda fit: fit.chi_squared)
-        longer = min((_refined(data, one) for one in tried[:REFINED]), key=lambda fit: fit.chi_squared)
+        longer = min((_poles_refined(data, one) for one in tried[:REFINED]), key=lambda fit: fit.chi_squared)
         if best.count and not best.coupled and best.damping == "viscous":
             # dampers that couple the modes are no further mode; with them the base shows
             bases = BASES if best.count > 1 else ("free, braked",)  # one mode alone is coupled to nothing else
-            mixed = (_refined(data, _on_base(data, replace(best, coupled=True), base)) for base in bases)
-            own = min(mixed, key=lambda fit: fit.criterion)
-            if own.criterion < min(best.criterion - STRONG, longer.criterion):
-                best = own
+            mixed = (_poles_refined(data, _on_base(data, replace(best, coupled=True), base)) for base in bases)
+            coupled = min(mixed, key=lambda fit: fit.criterion)
+            if coupled.criterion < min(best.criterion - STRONG, longer.criterion):
+                best = coupled
                 continue
         if longer.criterion > best.criterion - STRONG:
             break
         if best.count and best.damping == "viscous":
             # nor are loss factors: modes that stand for them lead the delay astray
-            lossy = _refined(data, _damped(data, best, "hysteretic"))
+            lossy = _poles_refined(data, _with_damping(data, best, "hysteretic"))
             if lossy.criterion < min(best.criterion - STRONG, longer.criterion):
                 best = lossy
                 continue
@@ -166,7 +171,7 @@ def fit_modes(
             break  # what is left is no mode
         best = longer
     others = [
-        _refined(data, _on_base(data, best, base))
+        _poles_refined(data, _on_base(data, best, base))
         for base in BASES
         if base != best.base and (best.count or base != "grounded")
     ]
@@ -177,7 +182,7 @@ def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
     """The modes nearest to those of a loop's plant, fitted to a response."""
     plant, T = loop.plant, loop.period
     n = plant.size
-    A = np.zeros((2 * n, 2 * n))
+    A = np.zeros((2 * n, 2 * n))  # of the state: positions, then velocities
     A[:n, n:] = np.eye(n)
     A[n:, :n] = -np.linalg.solve(plant.mass, plant.stiffness)
     A[n:, n:] = -np.linalg.solve(plant.mass, plant.damping)
@@ -186,17 +191,18 @@ def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
     real = np.sort(
         np.abs(poles[(np.abs(poles.imag) < 1e-9 * np.abs(poles)) & (np.log(np.abs(poles) + 1e-300) > low)].real)
     )
-    pairs = [(np.abs(p), -p.real / np.abs(p)) for p in poles if p.imag > 1e-9 * np.abs(p)]
-    pairs += [
+    rates_and_ratios = [(np.abs(p), -p.real / np.abs(p)) for p in poles if p.imag > 1e-9 * np.abs(p)]
+    # two real poles a and b make w^2 = a b and 2 zeta w = a + b
+    rates_and_ratios += [
         (np.sqrt(a * b), 0.5 * (a + b) / np.sqrt(a * b)) for a, b in zip(real[::2], real[1::2], strict=False)
     ]
     vector = [loop.controller.delay]
-    for w, ratio in pairs:
+    for w, ratio in rates_and_ratios:
         if low < np.log(w) < fast:
             vector += [np.log(w), np.log(max(ratio, 2.0 * LEAST_RATIO))]
-    start = _solved(data, "free", T, np.array(vector))
+    start = _residues_solved(data, "free", T, np.array(vector))
     fits = [_on_base(data, replace(start, coupled=coupled), base) for base in BASES for coupled in (False, True)]
-    return min((_refined(data, fit) for fit in fits), key=lambda fit: fit.criterion)
+    return min((_poles_refined(data, fit) for fit in fits), key=lambda fit: fit.criterion)
 
 
 def _pruned(data: RecordResponse, fit: ModalFit) -> ModalFit:
@@ -206,11 +212,11 @@ def _pruned(data: RecordResponse, fit: ModalFit) -> ModalFit:
         for i in range(fit.count):
             at = fit._before + 2 * i
             vector = np.delete(fit.vector, [at, at + 1])
-            shorter.append(_solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled))
-        one = _refined(data, min(shorter, key=lambda other: other.chi_squared))
-        if one.criterion > fit.criterion + STRONG:
+            shorter.append(_residues_solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled))
+        pruned = _poles_refined(data, min(shorter, key=lambda other: other.chi_squared))
+        if pruned.criterion > fit.criterion + STRONG:
             return fit
-        fit = one
+        fit = pruned
     return fit
 
 
@@ -218,7 +224,7 @@ def _on_base(data: RecordResponse, fit: ModalFit, base: str) -> ModalFit:
     """The same modes on another base, one of `BASES`, with the residues solved anew."""
     modes = fit.vector[fit._before :]
     vector = np.r_[fit.vector[0], _first_brake(base, data, fit.period), modes]
-    return _solved(data, base, fit.period, vector, fit.damping, fit.coupled)
+    return _residues_solved(data, base, fit.period, vector, fit.damping, fit.coupled)
 
 
 def _first_brake(base: str, data: RecordResponse, period: float) -> list[float]:
@@ -226,31 +232,33 @@ def _first_brake(base: str, data: RecordResponse, period: float) -> list[float]:
     return [float(np.log(data.theta.min() / period))] if base == "free, braked" else []
 
 
-def _with_mode(data: RecordResponse, fit: ModalFit) -> list[ModalFit]:
+def _with_one_more_mode(data: RecordResponse, fit: ModalFit) -> list[ModalFit]:
     """Fits with one more mode, where it lowers the sum of squares most: one below half the sampling rate and one
     above, which sampling makes look much alike."""
     columns = data.apply(fit.columns(fit.vector, data.theta))
     q, _ = np.linalg.qr(columns)
-    rest = data.target - q @ (q.T @ data.target)
-    f = np.unique(data.theta)
-    f = f[np.unique(np.linspace(0, len(f) - 1, POINTS).astype(int))]
-    f = np.append(f, 2.0 * np.pi - f[f > FOLDED[0] * np.pi])
-    choices = [(np.log(t / fit.period), np.log(zeta)) for t in f for zeta in RATIOS]
-    pairs = [(float(np.exp(zeta + w)), float(np.exp(2.0 * w))) for w, zeta in choices]
-    gain = np.empty(len(pairs))
-    for first in range(0, len(pairs), TRIED):
+    remainder = data.target - q @ (q.T @ data.target)
+    angles = np.unique(data.theta)
+    angles = angles[np.unique(np.linspace(0, len(angles) - 1, POINTS).astype(int))]
+    # and those above half the sampling rate that fold onto them
+    angles = np.append(angles, 2.0 * np.pi - angles[angles > FOLDED[0] * np.pi])
+    logarithms = [(np.log(angle / fit.period), np.log(zeta)) for angle in angles for zeta in RATIOS]
+    # zeta w, and w^2
+    decays_and_squares = [(float(np.exp(zeta + w)), float(np.exp(2.0 * w))) for w, zeta in logarithms]
+    gain = np.empty(len(decays_and_squares))
+    for first in range(0, len(decays_and_squares), TRIED):
         part = slice(first, first + TRIED)
-        rows = data.apply(_held_responses(pairs[part], fit.period, float(fit.vector[0]), data.theta))
+        rows = data.apply(_held_responses(decays_and_squares[part], fit.period, float(fit.vector[0]), data.theta))
         rows -= q @ (q.T @ rows)
         size = np.sum(rows**2, axis=0)
-        gain[part] = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
-    above = np.repeat(f > np.pi, len(RATIOS))
+        gain[part] = (remainder @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
+    above = np.repeat(angles > np.pi, len(RATIOS))
     best = [int(np.argmax(np.where(which, gain, -1.0))) for which in (~above, above) if which.any()]
-    vectors = [np.r_[fit.vector, choices[i]] for i in best]
-    return [_solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled) for vector in vectors]
+    vectors = [np.r_[fit.vector, logarithms[i]] for i in best]
+    return [_residues_solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled) for vector in vectors]
 
 
-def _solved(
+def _residues_solved(
     data: RecordResponse,
     base: str,
     period: float,
@@ -281,7 +289,7 @@ def _residuals(data: RecordResponse, fit: ModalFit) -> Callable[[Floats], Floats
     return left
 
 
-def _limits(fit: ModalFit, data: RecordResponse) -> tuple[Floats, Floats]:
+def _search_bounds(fit: ModalFit, data: RecordResponse) -> tuple[Floats, Floats]:
     """Bounds of `ModalFit.vector` within which a search stays."""
     T = fit.period
     slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
@@ -293,11 +301,11 @@ def _limits(fit: ModalFit, data: RecordResponse) -> tuple[Floats, Floats]:
     return np.array(low), np.array(high)
 
 
-def _refined(data: RecordResponse, fit: ModalFit) -> ModalFit:
+def _poles_refined(data: RecordResponse, fit: ModalFit) -> ModalFit:
     """The fit with the poles and the delay, near its own, that explain the response best; modes stay as many."""
     from scipy.optimize import least_squares
 
-    low, high = _limits(fit, data)
+    low, high = _search_bounds(fit, data)
     start = np.clip(fit.vector, low + 1e-9, high - 1e-9)
     solved = least_squares(
         _residuals(data, fit),
@@ -308,7 +316,7 @@ def _refined(data: RecordResponse, fit: ModalFit) -> ModalFit:
         xtol=1e-7,
         max_nfev=40,
     )
-    return _solved(data, fit.base, fit.period, np.asarray(solved.x), fit.damping, fit.coupled)
+    return _residues_solved(data, fit.base, fit.period, np.asarray(solved.x), fit.damping, fit.coupled)
 
 
 def modal_intervals(data: RecordResponse, fit: ModalFit, *, profiled: bool = True) -> tuple[Fit, Floats]:
@@ -317,7 +325,7 @@ def modal_intervals(data: RecordResponse, fit: ModalFit, *, profiled: bool = Tru
 
     profiled  False: all by the curvature
     """
-    low, high = _limits(fit, data)
+    low, high = _search_bounds(fit, data)
     start = np.clip(fit.vector, low + 1e-9, high - 1e-9)
     rows = len(data.target)
     found = fit_least_squares(
@@ -329,29 +337,30 @@ def modal_intervals(data: RecordResponse, fit: ModalFit, *, profiled: bool = Tru
         effective_count=rows * (rows - len(fit.residues)) / rows,
     )
     step = 1e-6
-    base = fit.columns(found.values, data.theta)
-    sides = list[Floats]()
+    modelled = fit.columns(found.values, data.theta)
+    by_vector = list[Floats]()
     for i in range(len(start)):
         moved = found.values.copy()
         moved[i] += step
         other = fit.columns(moved, data.theta)
-        sides.append(data.apply((other - base) @ fit.residues) / step)
-    jacobian = np.column_stack([*sides, data.apply(base)])
+        by_vector.append(data.apply((other - modelled) @ fit.residues) / step)
+    jacobian = np.column_stack([*by_vector, data.apply(modelled)])
+    # derivatives by the vector, then by the residues
     size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     inverse = np.linalg.pinv((jacobian / size).T @ (jacobian / size)) / np.outer(size, size)
     return found, found.scale * np.sqrt(np.maximum(np.diag(inverse)[len(start) :], 0.0))
 
 
-def _damped(data: RecordResponse, fit: ModalFit, damping: Damping) -> ModalFit:
+def _with_damping(data: RecordResponse, fit: ModalFit, damping: Damping) -> ModalFit:
     """The same modes with another damping, not coupled."""
-    return _solved(data, fit.base, fit.period, fit.vector, damping)
+    return _residues_solved(data, fit.base, fit.period, fit.vector, damping)
 
 
 def with_either_damping(data: RecordResponse, fit: ModalFit) -> tuple[ModalFit, ModalFit]:
     """The same modes with dampers, and with loss factors: the criteria of both tell which explains the response
     better. Modes that stood for what the other damping does not explain fall away."""
     another: Damping = "hysteretic" if fit.damping == "viscous" else "viscous"
-    other = _pruned(data, _refined(data, _damped(data, fit, another)))
+    other = _pruned(data, _poles_refined(data, _with_damping(data, fit, another)))
     return (fit, other) if fit.damping == "viscous" else (other, fit)
 
 
@@ -376,8 +385,11 @@ class _Column(NamedTuple):
 
 
 def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coupled: bool) -> list[_Column]:
-    """The base, each mode, all faster ones, and, where dampers couple the modes, each mode's velocity over w, less
-    that of the brake or of the first mode."""
+    """The columns of `ModalFit.columns`: the base, each mode, all faster ones, and, where dampers couple the
+    modes, each mode's velocity over w, less that of the brake or of the first mode.
+
+    vector  delay, brake and modes, as `ModalFit` has them
+    """
     before = 2 if base == "free, braked" else 1
     columns = list[_Column]()
     if base == "free":
@@ -389,7 +401,7 @@ def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coup
     fast = FASTEST * np.pi / period
     columns.append(_Column(fast, fast**2))
     if coupled:
-        joined = [(one.decay, one.squared) for one in columns[int(base == "free") : -1]]
+        joined = [(one.decay, one.squared) for one in columns[int(base == "free") : -1]]  # brake, and modes
         # nothing is coupled where there is neither a brake nor a mode
         columns += [_Column(a, w2, 1.0 / np.sqrt(max(w2, a**2)), joined[0]) for a, w2 in joined[1:]]
     return columns
@@ -412,10 +424,10 @@ def _column(
         pairs = [(column.decay, column.squared), column.less]
         both = _held_responses(pairs, period, delay, theta, column.velocity)
         return np.asarray(both[:, 0] - both[:, 1])
-    own = _held_responses([(column.decay, column.squared)], period, delay, theta)[:, 0]
+    response = _held_responses([(column.decay, column.squared)], period, delay, theta)[:, 0]
     if column.loss is not None and aliased is not None:
-        own = own + _added_by_loss(*column.loss, aliased)
-    return own
+        response = response + _added_by_loss(*column.loss, aliased)
+    return response
 
 
 class _RowsOfColumns:
@@ -456,16 +468,17 @@ def _held_responses(
 
     delay     [samples];   velocity  factor of the velocity, which is given in place of the motion; 0: the motion
     """
-    whole, fraction = split_delay(delay)
+    whole, fraction = split_delay(delay)  # samples
     d = (2j * np.sin(0.5 * theta) * np.exp(0.5j * theta))[:, None]
     z = 1.0 + d
-    share = (0.0, velocity) if velocity else (1.0, 0.0)
-    rows = [held_row(a, w2, *share, period, fraction) for a, w2 in pairs]
+    position_and_velocity = (0.0, velocity) if velocity else (1.0, 0.0)
+    rows = [held_row(a, w2, *position_and_velocity, period, fraction) for a, w2 in pairs]
+    # in d = z - 1: denominator, numerators of the force now and of the one before, see `loop.hold`
     d1, d0, _, n1, n0, _, o1, o0 = np.array(rows).T
-    top = n1 * d + n0
+    numerator = n1 * d + n0
     if fraction > 0.0:
-        top = top + (o1 * d + o0) / z
-    return np.asarray(top / ((d + d1) * d + d0) / z**whole)
+        numerator = numerator + (o1 * d + o0) / z
+    return np.asarray(numerator / ((d + d1) * d + d0) / z**whole)
 
 
 def _aliased_hold(period: float, delay: float, theta: Floats) -> tuple[Floats, Complexes]:

@@ -84,8 +84,8 @@ class SampledModel:
     def values(self, vector: Floats) -> Floats:
         """Values (p,) of what an optimiser varies; infinite ends of intervals become 0 and infinity."""
         with np.errstate(over="ignore"):
-            own = [np.exp(x) if one.positive else x for one, x in zip(self.quantities, vector, strict=True)]
-        return np.asarray(np.maximum(np.array(own), 0.0))
+            numbers = [np.exp(x) if one.positive else x for one, x in zip(self.quantities, vector, strict=True)]
+        return np.asarray(np.maximum(np.array(numbers), 0.0))
 
     def response(self, vector: Floats, theta: Floats) -> Complexes:
         """P(exp(i theta)) (n,) [m/N] for what an optimiser varies; nan where there is no such device."""
@@ -135,18 +135,18 @@ def filter_lag(controller: Controller) -> float:
     return float(-np.angle(passed[0])) / SMALL * controller.sampling_period
 
 
-def _delays(device: Device, controller: Controller, full: Sequence[str]) -> list[Quantity]:
+def _delay_quantities(device: Device, controller: Controller, full: Sequence[str]) -> list[Quantity]:
     """The delays to identify: the sum of delay, actuator's and filter's lag, and the actuator's lag by itself.
 
     full  paths that are named: the sum with a path of the delay or with (), the lag with its own path only
     """
-    T, lag, own = controller.sampling_period, controller.actuator_time_constant, filter_lag(controller)
+    T, lag, lag_of_filter = controller.sampling_period, controller.actuator_time_constant, filter_lag(controller)
     path = DELAYS[1] if device.document.get("loop", {}).get("delay_s") is not None else DELAYS[0]
     unit = T if path == DELAYS[0] else 1.0
     found = list[Quantity]()
     if not full or any(one in DELAYS for one in full):
-        total = controller.delay * T + lag + own
-        entry = (path, 1.0 / unit, -(lag + own) / unit)
+        total = controller.delay * T + lag + lag_of_filter
+        entry = (path, 1.0 / unit, -(lag + lag_of_filter) / unit)  # the file's delay is the sum less both lags
         found.append(
             Quantity("sum of delay, current loop and filter", "s", float(total), float(total), False, (entry,))
         )
@@ -157,15 +157,15 @@ def _delays(device: Device, controller: Controller, full: Sequence[str]) -> list
 
 
 def _with_delays(controller: Controller, quantities: Sequence[Quantity], values: Floats) -> Controller:
-    """The controller with other delays, quantities of `_delays` and their values (d,) [s]: from the sum the
-    actuator's and the filter's lag are taken off."""
+    """The controller with other delays, quantities of `_delay_quantities` and their values (d,) [s]: from the sum
+    the actuator's and the filter's lag are taken off."""
     given = {one.entries[0][0]: float(v) for one, v in zip(quantities, values, strict=True)}
     lag = given.get(LAG, controller.actuator_time_constant)
     total = next((given[path] for path in DELAYS if path in given), None)
     if total is None:
         return replace(controller, actuator_time_constant=lag)
-    rest = max(total - lag - filter_lag(controller), 0.0)
-    return replace(controller, actuator_time_constant=lag, delay=rest / controller.sampling_period)
+    delay = max(total - lag - filter_lag(controller), 0.0)
+    return replace(controller, actuator_time_constant=lag, delay=delay / controller.sampling_period)
 
 
 # --- plants given by matrices -----------------------------------------------------------------------------------
@@ -175,7 +175,7 @@ def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> 
     """The model of a plant given by matrices, in those of its masses, springs, dampers, loss factor and delays
     that the paths `full` name; (): in all of them. Raises DeviceError for another path."""
     plant, controller = point.ungripped_plant, point.loop.controller
-    timing = _delays(device, controller, full)
+    timing = _delay_quantities(device, controller, full)
     shapes = list[tuple[str, Any]]()  # what each quantity does to the plant
     quantities = list[Quantity]()
     for key, (name, unit) in MATRICES.items():
@@ -187,10 +187,10 @@ def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> 
     if eta and (not full or "plant.loss_factor" in full):
         quantities.append(Quantity("loss factor", "", eta, eta, True, (("plant.loss_factor", 1.0, 0.0),)))
         shapes.append(("loss factor", None))
-    unknown = [p for p in full if p not in _covered([*quantities, *timing])]
+    unknown = [p for p in full if p not in _covered_paths([*quantities, *timing])]
     if unknown:
         raise fail(device.label, unknown[0], "is not a mass, spring, damper, loss factor or delay of the device")
-    fixed = _remainder(plant, quantities, shapes)
+    fixed = _fixed_matrices(plant, quantities, shapes)
     count = len(quantities)
 
     def loop_of(values: Floats) -> Loop:
@@ -210,20 +210,25 @@ def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> 
     return SampledModel((*quantities, *timing), loop_of)
 
 
-def _covered(quantities: Sequence[Quantity]) -> set[str]:
-    """Paths of the numbers that the quantities make, the delays always among them."""
+def _covered_paths(quantities: Sequence[Quantity]) -> set[str]:
+    """Paths of the numbers that the quantities make, `DELAYS` always among them."""
     return {path for one in quantities for path, _, _ in one.entries} | set(DELAYS)
 
 
-def _remainder(plant: Plant, quantities: Sequence[Quantity], shapes: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    """The plant's matrices less what the quantities add to them at their values in the file; rounding set to 0."""
-    rest = {name: getattr(plant, name).copy() for name, _ in MATRICES.values()}
+def _fixed_matrices(
+    plant: Plant, quantities: Sequence[Quantity], shapes: Sequence[tuple[str, Any]]
+) -> dict[str, Any]:
+    """The plant's matrices less what the quantities add to them at their values in the file; rounding set to 0.
+
+    shapes  of each quantity: name of the matrix, and what one unit of it is there (n, n), None for a loss factor
+    """
+    fixed = {name: getattr(plant, name).copy() for name, _ in MATRICES.values()}
     for one, (name, shape) in zip(quantities, shapes, strict=True):
         if shape is not None:
-            rest[name] -= one.given * shape
-    for name, matrix in rest.items():
+            fixed[name] -= one.given * shape
+    for name, matrix in fixed.items():
         matrix[np.abs(matrix) <= NOTHING * max(float(np.abs(getattr(plant, name)).max()), 1e-300)] = 0.0
-    return rest
+    return fixed
 
 
 def _elements(
@@ -246,7 +251,8 @@ def _elements(
         return []
     given = device.document.get("plant", {}).get(key)
     lossy = plant.hysteresis is not None
-    like = np.abs(plant.stiffness) if name == "damping" and not lossy else np.abs(matrix)
+    # entries that there may be: of a damper beside each spring
+    pattern = np.abs(plant.stiffness) if name == "damping" and not lossy else np.abs(matrix)
     least = NOTHING * max(float(np.abs(matrix).max()), 1e-300)
 
     def entry(i: int, j: int, factor: float) -> tuple[tuple[str, float, float], ...]:
@@ -259,7 +265,7 @@ def _elements(
     for i in range(n):
         for j in range(i + 1, n):
             coupled = abs(matrix[i, j]) > least or (
-                like[i, j] > NOTHING * max(like.max(), 1e-300) and name == "damping"
+                pattern[i, j] > NOTHING * max(pattern.max(), 1e-300) and name == "damping"
             )
             if not coupled:
                 continue
@@ -341,11 +347,11 @@ def without_hand(point: OperatingPoint) -> Loop:
 
 
 def _file_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> SampledModel:
-    """The model of any device, in the numbers of its file at the paths `full`, or in `_usual` ones where none is
-    named; the file is read anew for each choice of values. Raises DeviceError for what is no number."""
+    """The model of any device, in the numbers of its file at the paths `full`, or in `_usual_paths` ones where
+    none is named; the file is read anew for each choice of values. Raises DeviceError for what is no number."""
     controller = point.loop.controller
-    timing = _delays(device, controller, full)
-    chosen = [path for path in full if path not in DELAYS and path != LAG] or _usual(device) * (not full)
+    timing = _delay_quantities(device, controller, full)
+    chosen = [path for path in full if path not in DELAYS and path != LAG] or _usual_paths(device) * (not full)
     quantities = list[Quantity]()
     for path in chosen:
         value = address.get(device.document, path)
@@ -368,7 +374,7 @@ def _file_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> S
     return SampledModel((*quantities, *timing), loop_of)
 
 
-def _usual(device: Device) -> list[str]:
+def _usual_paths(device: Device) -> list[str]:
     """Paths of what is identified of a mechanism where none is named: stiffness of the drives, damping ratio."""
     mechanism = device.document.get("mechanism", {})
     found = list[str]()

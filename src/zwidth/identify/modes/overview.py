@@ -57,7 +57,7 @@ def survey_of(sources: Sequence[Source], segment: int | None, progress: Progress
     length = segment_length(longest, segment or (period if 64 <= period <= longest // 4 else None))
     length = min(length, LONGEST_SEGMENT) if segment is None else length
     differences = {"force": 0, "position": 2} | ({"reference": 0} if sources[0].channels.reference else {})
-    levels, loudest, done = [Levels() for _ in sources], (-1.0, 0, 0), 0
+    levels, loudest, done = [Levels() for _ in sources], (-1.0, 0, 0), 0  # loudest: size, record, stretch
     powers, agreement = list[Floats](), list[tuple[str, float]]()
     first_spectra = total = averaged_spectra([], sources[0].sampling.period, length, differences)
     for k, source in enumerate(sources):
@@ -75,12 +75,13 @@ def survey_of(sources: Sequence[Source], segment: int | None, progress: Progress
             done += len(stretch.force)
             if progress is not None:
                 progress("reading records", done, sum(one.sampling.rows for one in sources))
-    covered = _covers(powers)
+    covered = _fit_part_covers(powers)
     return Survey(total, levels, loudest[1:], longest, len(powers), covered, agreement, period)
 
 
 def _times_as_far(first: Spectra, other: Spectra) -> float:
-    """How many times as far a stretch (other) moves as the first one's response says, where both have force."""
+    """How many times as far a stretch (other) moves as the first one's response says, where both have force; 1
+    where that is nowhere."""
     into = "reference" if "reference" in first.channels else "force"
     response = first.response(into, "position") * (first.z - 1.0) ** 2
     known = first.coherence(into, "position") > COHERENT
@@ -99,44 +100,46 @@ def _band_powers(force: Floats, longest: int) -> Floats:
     rows = []
     for part in (force[:cut], force[cut:]):
         power = np.abs(np.fft.rfft(part - part.mean())) ** 2 / len(part)
-        f = np.fft.rfftfreq(len(part))
-        rows.append(np.histogram(f, edges, weights=power)[0])
+        frequency = np.fft.rfftfreq(len(part))
+        rows.append(np.histogram(frequency, edges, weights=power)[0])
     return np.array(rows)
 
 
-def _covers(powers: Sequence[Floats]) -> bool:
+def _fit_part_covers(powers: Sequence[Floats]) -> bool:
     """Whether the fitted part has its share of the force's power in every band of frequencies that is excited.
 
     Fitted are the first parts: of the stretches where there are many (2 UNSEEN), else of each; the rest is for the
     validation.
 
-    powers  `_band_powers` of each stretch
+    powers  `_band_powers` of each stretch: (2, 12), its first part and its last one
     """
     if not powers:
         return False
     if len(powers) >= 2 * UNSEEN:
         cut = len(powers) - len(powers) // UNSEEN
-        fitted = np.sum([p.sum(axis=0) for p in powers[:cut]], axis=0)
-        total = np.sum([p.sum(axis=0) for p in powers], axis=0)
+        fitted = np.sum([power.sum(axis=0) for power in powers[:cut]], axis=0)
+        total = np.sum([power.sum(axis=0) for power in powers], axis=0)
     else:
-        fitted = np.sum([p[0] for p in powers], axis=0)
-        total = np.sum([p.sum(axis=0) for p in powers], axis=0)
+        fitted = np.sum([power[0] for power in powers], axis=0)
+        total = np.sum([power.sum(axis=0) for power in powers], axis=0)
     counted = total > 1e-4 * np.max(total)
     return bool(np.all(fitted[counted] >= COVERED * total[counted]))
 
 
-def peaks(spectra: Spectra) -> Complexes:
-    """Poles that the peaks of the averaged response show, each as wide as its peak, or as a segment's line."""
+def peak_poles(spectra: Spectra) -> Complexes:
+    """Poles (p,) [1/s], the upper one of each pair, that at most eight peaks of the averaged response show, each
+    as wide as its peak, or as a segment's line.
+    """
     from scipy.signal import find_peaks
 
     value = spectra.response("force", "position") * (spectra.z - 1.0) ** 2
     coherence = spectra.coherence("force", "position")
     size = np.log(np.maximum(np.abs(value), 1e-300))
     size = np.where(coherence > COHERENT, size, size[coherence > COHERENT].min(initial=0.0))
-    at, about = find_peaks(size, prominence=0.7, width=1, rel_height=0.5)
-    order = np.argsort(about["prominences"])[::-1][:8]
+    lines, properties = find_peaks(size, prominence=0.7, width=1, rel_height=0.5)
+    order = np.argsort(properties["prominences"])[::-1][:8]
     step = 1.0 / (spectra.length * spectra.period)
-    f, width = spectra.frequency[at[order]], np.maximum(about["widths"][order], 1.0) * step
+    f, width = spectra.frequency[lines[order]], np.maximum(properties["widths"][order], 1.0) * step
     return np.asarray(-np.pi * np.minimum(width, 0.2 * f) * 0.5 + 2j * np.pi * f)
 
 
@@ -189,25 +192,26 @@ def periodic_lines(period: int, source: Source, details: dict[str, Any]) -> list
         return []
     kept = count - 1  # the first period is that of the transient
     U, Y = (
-        _lines(values, period, kept) for values in (first.force, np.diff(first.position - first.position[0], n=2))
+        _period_transforms(values, period, kept)
+        for values in (first.force, np.diff(first.position - first.position[0], n=2))
     )
     power = np.abs(U.mean(axis=0)) ** 2
     excited = power > LINE * np.max(power[1:])
     excited[0] = False
-    h = np.flatnonzero(excited)
+    lines = np.flatnonzero(excited)
     details["period_samples"] = period
-    if len(h) < 4:
-        return [f"the force repeats every {period} samples, with {len(h)} lines"]
+    if len(lines) < 4:
+        return [f"the force repeats every {period} samples, with {len(lines)} lines"]
     mean, scatter = Y.mean(axis=0), Y.std(axis=0, ddof=1) / np.sqrt(len(Y))
-    inside = np.arange(len(power)) <= h[-1]
-    inside &= np.arange(len(power)) >= h[0]
-    if len(h) == np.count_nonzero(inside):
+    inside = np.arange(len(power)) <= lines[-1]
+    inside &= np.arange(len(power)) >= lines[0]
+    if len(lines) == np.count_nonzero(inside):
         text = (
             f"the force repeats every {period} samples and excites each line: what a nonlinearity makes is not "
             "told from the device; leave out even lines, and one odd line in four, to see it"
         )
         return [text]
-    remark = f"the force repeats every {period} samples and excites {len(h)} lines"
+    remark = f"the force repeats every {period} samples and excites {len(lines)} lines"
     return [remark, *_distortion_remarks(mean, scatter, excited, inside, details)]
 
 
@@ -228,19 +232,19 @@ def _distortion_remarks(
         "odd": "friction, backlash or saturation",
     }
     for name, parity in (("even", ~odd), ("odd", odd)):
-        left = inside & ~excited & parity
-        if not left.any():
+        unexcited = inside & ~excited & parity
+        if not unexcited.any():
             continue
-        level, own = (
-            float(np.sqrt(np.mean(np.abs(mean[left]) ** 2))),
-            float(np.sqrt(np.mean(np.abs(scatter[left]) ** 2))),
+        level, noise = (
+            float(np.sqrt(np.mean(np.abs(mean[unexcited]) ** 2))),
+            float(np.sqrt(np.mean(np.abs(scatter[unexcited]) ** 2))),
         )
-        whole = float(np.sqrt(np.mean(np.abs(mean[excited]) ** 2)))
-        details[f"{name}_distortion"] = float(np.sqrt(max(level**2 - own**2, 0.0))) / whole
-        if level > CLEAR * own:
+        excited_level = float(np.sqrt(np.mean(np.abs(mean[excited]) ** 2)))
+        details[f"{name}_distortion"] = float(np.sqrt(max(level**2 - noise**2, 0.0))) / excited_level
+        if level > CLEAR * noise:
             remarks.append(
                 f"{name} lines that were not excited move {100.0 * details[f'{name}_distortion']:.2g} % as "
-                f"much as the excited ones, {level / own:.2g} times their noise: {names[name]}, which the "
+                f"much as the excited ones, {level / noise:.2g} times their noise: {names[name]}, which the "
                 "coherence does not show"
             )
         else:
@@ -248,7 +252,7 @@ def _distortion_remarks(
     return remarks
 
 
-def _lines(values: Floats, period: int, count: int) -> Complexes:
+def _period_transforms(values: Floats, period: int, count: int) -> Complexes:
     """Transforms (k, n) of the last k whole periods [samples] of a signal, `count` of them at most."""
     last = values[len(values) - count * period :] if len(values) >= count * period else values
     whole = len(last) // period
@@ -354,7 +358,7 @@ def averaged_spectra(
     """
     names = tuple(differences)
     order = tuple(differences.values())
-    sums = _Sums(len(names), length)
+    sums = _SpectraSums(len(names), length)
     for stretch in stretches:
         sums.add([stretch[name] for name in names], order)
     usable = slice(2, None)
@@ -371,7 +375,7 @@ def merged_spectra(several: Sequence[Spectra]) -> Spectra:
     return replace(first, matrix=total / max(count, 1), segments=count)
 
 
-class _Sums:
+class _SpectraSums:
     """Running sums of the auto- and cross-spectra of segments of `length` samples, see `Spectra.matrix`."""
 
     def __init__(self, channels: int, length: int) -> None:
@@ -381,16 +385,16 @@ class _Sums:
 
     def add(self, values: Sequence[Floats], order: Sequence[int]) -> None:
         """Add the segments of channels (c, n), each differenced as often as `order` (c,) says."""
-        L, hop = self.length, self.length // 2
+        length, hop = self.length, self.length // 2
         n = len(values[0]) - max(order, default=0)
-        if n < L:
+        if n < length:
             return
-        count = 1 + (n - L) // hop
-        moved = [np.diff(row, n=m)[:n] for row, m in zip(values, order, strict=True)]
-        several = max(1, BATCH // (L * len(order)))
+        count = 1 + (n - length) // hop
+        differenced = [np.diff(row, n=m)[:n] for row, m in zip(values, order, strict=True)]
+        several = max(1, BATCH // (length * len(order)))
         for first in range(0, count, several):
             starts = range(first, min(first + several, count))
-            spectra = [self._transform(row, starts) for row in moved]
+            spectra = [self._transform(row, starts) for row in differenced]
             for a, one in enumerate(spectra):
                 for b in range(a, len(spectra)):
                     product = np.einsum("sk,sk->k", one, np.conj(spectra[b]))

@@ -76,13 +76,14 @@ def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period
     From the file's numbers first, and from others where these may not lead there (`_Search`). Where a response
     says little of a mode, several minima are hardly different, and all of them set the ends of intervals.
     """
-    low, high = _limits(model, period)
+    low, high = _search_bounds(model, period)
     start = np.clip(model.vector(np.maximum(model.start, 1e-300)), low, high)
+    # the delay begins at that of the modes
     timed = [i for i, one in enumerate(model.quantities) if not one.positive and one.unit == "s"]
     if timed and modal.count:
         start[timed[0]] = np.clip(modal.delay, 0.0, high[timed[0]])
     search = _Search(data, model, modal, period, start, low, high)
-    best, *rivals = _lowest(search.minima())
+    best, *rivals = _lowest_minima(search.minima())
     fit = fit_least_squares(search.residuals, best, lower=low, upper=high, rivals=rivals)
     return PhysicalFit(
         model.values(fit.values),
@@ -94,7 +95,7 @@ def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period
     )
 
 
-def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
+def _search_bounds(model: SampledModel, period: float) -> tuple[Floats, Floats]:
     """Bounds (p,) of what the optimiser varies; period [s]."""
     low, high = np.empty((2, len(model.quantities)))
     for i, one in enumerate(model.quantities):
@@ -105,17 +106,17 @@ def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
     return low, high
 
 
-def _lowest(minima: Sequence[tuple[Floats, float]]) -> list[Floats]:
+def _lowest_minima(minima: Sequence[tuple[Floats, float]]) -> list[Floats]:
     """Places (p,) of the lowest minimum, and of some others elsewhere that are hardly higher.
 
     minima  place and sum of squares of each
     """
     found = list[Floats]()
     least = min(height for _, height in minima)
-    for x, height in sorted(minima, key=lambda one: one[1]):
-        apart = all(np.max(np.abs(x - other)) > ELSEWHERE for other in found)
+    for place, height in sorted(minima, key=lambda one: one[1]):
+        apart = all(np.max(np.abs(place - other)) > ELSEWHERE for other in found)
         if apart and height < least + RIVAL and len(found) <= RIVALS:
-            found.append(x)
+            found.append(place)
     return found
 
 
@@ -152,17 +153,17 @@ class _Search:
         good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
         found = [self._descended(self.start)]
         if found[0][1] > good and modal.chi_squared < HOPELESS * len(self.data.target):
-            for x in self._by_logarithm():
+            for x in self._starts_by_logarithm():
                 found.append(self._descended(x))
                 if found[-1][1] <= good:
                     break
         best, least = min(found, key=lambda one: one[1])
-        others = self._unfolded(best)
-        shares = self._rates(best) * self.period / np.pi
+        others = self._mirrored_starts(best)
+        shares = self._mode_rates(best) * self.period / np.pi
         unsure = bool(np.any((shares > UNSURE[0]) & (shares < UNSURE[1])))
         hidden = int(np.sum(shares < FOLDED[1])) > modal.count
         if unsure or hidden or modal.chi_squared + CLOSE < least <= good:
-            others += self._spread(np.log(AROUND), AROUND_TRIED)
+            others += self._starts_about(np.log(AROUND), AROUND_TRIED)
         return found + [self._descended(x) for x in others]
 
     def _descended(self, x: Floats) -> tuple[Floats, float]:
@@ -173,7 +174,7 @@ class _Search:
         solved = least_squares(self.residuals, x, bounds=bounds, x_scale="jac", ftol=1e-6, xtol=1e-7, max_nfev=40)
         return np.asarray(solved.x), 2.0 * float(solved.cost)
 
-    def _rates(self, x: Floats) -> Floats:
+    def _mode_rates(self, x: Floats) -> Floats:
         """Natural frequencies of the flexible modes [rad/s], ascending; () where there is no such device."""
         try:
             plant = self.model.loop_of(self.model.values(x)).plant
@@ -182,21 +183,22 @@ class _Search:
         squared = undamped_modes(plant.mass, plant.stiffness)[0]
         return np.sqrt(squared[squared > 0.0])
 
-    def _unfolded(self, best: Floats) -> list[Floats]:
+    def _mirrored_starts(self, best: Floats) -> list[Floats]:
         """Starts with a mode on the other side of half the sampling rate, and with other damping: sampling
         makes all of them look much alike. Springs and dampers are scaled."""
         springs = np.array([one.unit in SPRINGS for one in self.model.quantities])
         dampers = np.array([one.unit in DAMPERS for one in self.model.quantities])
         starts = list[Floats]()
-        for rate in self._rates(best):
+        for rate in self._mode_rates(best):
             if FOLDED[0] < rate * self.period / np.pi < FOLDED[1]:
                 mirrored = 2.0 * np.pi / self.period - rate
+                # w goes with the root of a spring, and a ratio of damping stays where a damper goes with w
                 for factor, damped in product(np.log([1.0, mirrored / rate]), np.log(DAMPED)):
                     x = best + 2.0 * factor * springs + (factor + damped) * dampers
                     starts.append(np.clip(x, self.low, self.high))
         return starts
 
-    def _spread(self, spread: float, count: int) -> list[Floats]:
+    def _starts_about(self, spread: float, count: int) -> list[Floats]:
         """So many starts spread evenly (Sobol) within `spread` about the start, in logarithms, with its delay."""
         from scipy.stats import qmc
 
@@ -205,7 +207,7 @@ class _Search:
         tried = np.where(positive, self.start + spread * (2.0 * cube - 1.0), np.minimum(self.start, self.high))
         return list(np.clip(tried, self.low + 1e-12, self.high))
 
-    def _by_logarithm(self) -> list[Floats]:
+    def _starts_by_logarithm(self) -> list[Floats]:
         """Starts about the file's numbers, refined on the logarithm of the response, best first."""
         from scipy.optimize import least_squares
 
@@ -215,22 +217,22 @@ class _Search:
         theta = theta[theta < 0.999 * np.pi]
         wanted, rates = self.modal.response(theta), self.modal.clear_rates
 
-        def off(x: Floats) -> Floats:
+        def remainder(x: Floats) -> Floats:
             """What parameters leave of the response's logarithm, and of those of the modes' frequencies."""
             P = self.model.response(x, theta)
             if not np.isfinite(P).all() or np.any(P == 0.0):
                 return np.full(2 * len(theta) + len(rates), LOST_START)
             ratio = np.log(wanted / P)
-            own = self._rates(x)[: len(rates)]
+            own_rates = self._mode_rates(x)[: len(rates)]
             apart = np.zeros(len(rates))
-            apart[: len(own)] = HEAVY * np.log(own / rates[: len(own)])
+            apart[: len(own_rates)] = HEAVY * np.log(own_rates / rates[: len(own_rates)])
             return np.concatenate([ratio.real, ratio.imag, apart])
 
-        tried = [np.clip(self.start, self.low + 1e-12, self.high), *self._spread(SPREAD, TRIED)]
-        costs = np.array([np.sum(off(x) ** 2) for x in tried])
+        tried = [np.clip(self.start, self.low + 1e-12, self.high), *self._starts_about(SPREAD, TRIED)]
+        costs = np.array([np.sum(remainder(x) ** 2) for x in tried])
         refined = list[tuple[float, Floats]]()
         for i in np.argsort(costs)[:REFINED]:
-            solved = least_squares(off, tried[i], bounds=(self.low, self.high), loss="soft_l1", max_nfev=40)
+            solved = least_squares(remainder, tried[i], bounds=(self.low, self.high), loss="soft_l1", max_nfev=40)
             refined.append((float(solved.cost), np.asarray(solved.x)))
         return [x for _, x in sorted(refined, key=lambda one: one[0])]
 
@@ -252,23 +254,25 @@ def modal_estimates(fit: ModalFit, profiled: Fit, spread: Floats, lossy: bool, t
     unit = "1/(kg m^2)" if turns else "1/kg"
     residues = fit.residues
     if fit.base != "grounded":
-        half = NORMAL * spread[0]
+        half_width = NORMAL * spread[0]
         found.append(
-            Estimate("residue of the free motion", residues[0], residues[0] - half, residues[0] + half, unit)
+            Estimate(
+                "residue of the free motion", residues[0], residues[0] - half_width, residues[0] + half_width, unit
+            )
         )
-    shift = 0 if fit.base == "grounded" else 1
+    first = 0 if fit.base == "grounded" else 1  # residue of the first mode
     for number, i in enumerate(order, 1):
-        at = before + 2 * int(i)
+        entry = before + 2 * int(i)  # ln w, and ln zeta behind it
         vectors = [np.minimum(v, LARGEST) for v in (profiled.values, profiled.low, profiled.high)]
-        f, f_low, f_high = (np.exp(v[at]) / (2.0 * np.pi) for v in vectors)
-        ratio, low, high = (np.exp(v[at + 1]) for v in vectors)
+        f, f_low, f_high = (np.exp(v[entry]) / (2.0 * np.pi) for v in vectors)
+        ratio, low, high = (np.exp(v[entry + 1]) for v in vectors)
         found.append(Estimate(f"natural frequency of mode {number}", float(f), float(f_low), float(f_high), "Hz"))
         name, factor = (
             (f"loss factor of mode {number}", 2.0) if lossy else (f"damping ratio of mode {number}", 1.0)
         )
         found.append(Estimate(name, factor * float(ratio), factor * float(low), factor * float(high), ""))
-        r, half = float(residues[shift + i]), NORMAL * float(spread[shift + i])
-        found.append(Estimate(f"residue of mode {number}", r, r - half, r + half, unit))
+        r, half_width = float(residues[first + i]), NORMAL * float(spread[first + i])
+        found.append(Estimate(f"residue of mode {number}", r, r - half_width, r + half_width, unit))
     return found
 
 
@@ -285,6 +289,7 @@ def device_estimates(
         _is_told(low, high, one.positive)
         for low, high, one in zip(found.low, found.high, model.quantities, strict=True)
     ]
+    # path -> index of each quantity that its number sums, factor, offset
     paths = dict[str, list[tuple[int, float, float]]]()
     for k, one in enumerate(model.quantities):
         for path, factor, offset in one.entries:
@@ -299,7 +304,7 @@ def device_estimates(
             continue
         # no number of the file by itself: it makes several, or a part of one
         composed = timing or len(one.entries) != 1 or len(paths[one.entries[0][0]]) > 1
-        within = "" if timing or not composed else _matrices(path for path, _, _ in one.entries)
+        within = "" if timing or not composed else _matrix_keys(path for path, _, _ in one.entries)
         if composed:
             estimates.append(Estimate(one.name, value, low, high, one.unit, within=within))
         if not one.entries:
@@ -312,13 +317,13 @@ def device_estimates(
             seen.add(path)
             name = "delay" if timing else f"{one.name}, in {path.partition('.')[2]}" if composed else one.name
             unit = ("samples" if path == DELAYS[0] else "s") if timing else one.unit
-            entry = _entry(device, model, found, path, paths[path], timing)
+            entry = _file_number(device, model, found, path, paths[path], timing)
             estimates.append(Estimate(name, *entry, unit, path, within))
     remarks += _delay_remarks(model, told)
     return estimates, remarks
 
 
-def _matrices(paths: Iterable[str]) -> str:
+def _matrix_keys(paths: Iterable[str]) -> str:
     """The keys of the matrices whose entries these are: plant.damping_Ns_per_m of plant.damping_Ns_per_m.0.1."""
     return ", ".join(dict.fromkeys(re.sub(r"(\.\d+)+$", "", path) for path in paths))
 
@@ -338,7 +343,7 @@ def _untold_remark(name: str, low: float, high: float, unit: str, hand: bool) ->
     return f"{name}: {why}" + (f", only that it is {bound}" if bound else "")
 
 
-def _entry(
+def _file_number(
     device: Device,
     model: SampledModel,
     found: PhysicalFit,
@@ -352,28 +357,31 @@ def _entry(
     """
     if timing or len(parts) == 1:
         k, factor, offset = parts[0]
-        base = offset
+        base = offset  # of a delay what is taken off its sum; of another number what is no quantity
         if not timing:
-            base = _rest(device, model, path, parts)
+            base = _fixed_part(device, model, path, parts)
         low, value, high = (factor * float(v[k]) + base for v in (found.low, found.values, found.high))
         if timing:
             return max(value, 0.0), max(low, 0.0), high
         return value, min(low, high), max(low, high)
-    value = _rest(device, model, path, parts)
+    value = _fixed_part(device, model, path, parts)
     value += float(np.sum([factor * found.values[k] for k, factor, _ in parts]))
+    # of a sum of several to first order, by the covariance of what the optimiser varies
     slopes = np.zeros(len(model.quantities))
     for k, factor, _ in parts:
         slopes[k] = factor * (found.values[k] if model.quantities[k].positive else 1.0)
-    half = NORMAL * float(np.sqrt(np.maximum(slopes @ found.fit.covariance @ slopes, 0.0)))
-    return value, value - half, value + half
+    half_width = NORMAL * float(np.sqrt(np.maximum(slopes @ found.fit.covariance @ slopes, 0.0)))
+    return value, value - half_width, value + half_width
 
 
-def _rest(device: Device, model: SampledModel, path: str, parts: Sequence[tuple[int, float, float]]) -> float:
-    """What the file's number at a path holds beside the identified quantities, `parts` as in `_entry`."""
+def _fixed_part(
+    device: Device, model: SampledModel, path: str, parts: Sequence[tuple[int, float, float]]
+) -> float:
+    """What the file's number at a path holds beside the identified quantities, `parts` as in `_file_number`."""
     given = address.get(device.document, path)
-    own = float(given) if isinstance(given, int | float) else 0.0
-    rest = own - sum(factor * model.quantities[k].given for k, factor, _ in parts)
-    return rest if abs(rest) > 1e-9 * abs(own) else 0.0
+    in_file = float(given) if isinstance(given, int | float) else 0.0
+    fixed = in_file - sum(factor * model.quantities[k].given for k, factor, _ in parts)
+    return fixed if abs(fixed) > 1e-9 * abs(in_file) else 0.0
 
 
 def _delay_remarks(model: SampledModel, told: Sequence[bool]) -> list[str]:

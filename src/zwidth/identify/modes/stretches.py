@@ -99,17 +99,17 @@ class Source:
             if held and goes_on:
                 part = {name: np.concatenate([held[name], values]) for name, values in part.items()}
             elif held:
-                yield from _stretch(held)
+                yield from _stretch_if_long_enough(held)
             while len(part["force"]) >= BLOCK:
-                yield from _stretch({name: values[:BLOCK] for name, values in part.items()})
+                yield from _stretch_if_long_enough({name: values[:BLOCK] for name, values in part.items()})
                 part = {name: values[BLOCK:] for name, values in part.items()}
             held = part
         if held:
-            yield from _stretch(held)
+            yield from _stretch_if_long_enough(held)
 
 
-def _stretch(columns: dict[str, Floats]) -> Iterator[Stretch]:
-    """The stretch of these columns (n,) by field; nothing where it has fewer than `SHORTEST` samples."""
+def _stretch_if_long_enough(columns: dict[str, Floats]) -> Iterator[Stretch]:
+    """Yield the stretch of these columns (n,) by field; nothing where it has fewer than `SHORTEST` samples."""
     force, position = columns["force"], columns["position"]
     if len(force) >= SHORTEST:
         yield Stretch(force, position, columns.get("reference"), columns.get("measured"))
@@ -143,16 +143,17 @@ class Levels:
         if self.origin is None:
             self.origin = both[:, 0].copy()
         low, high = both.min(axis=1), both.max(axis=1)
-        if low[0] < self.low[0] or high[0] > self.high[0]:
+        if low[0] < self.low[0] or high[0] > self.high[0]:  # a larger force: those counted before are below it
             self.at_limit = 0
         self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
         self.at_limit += int(np.count_nonzero((both[0] == self.low[0]) | (both[0] == self.high[0])))
-        about = both - self.origin[:, None]
-        self.total += about.sum(axis=1)
-        self.square += (about**2).sum(axis=1)
+        differences = both - self.origin[:, None]
+        self.total += differences.sum(axis=1)
+        self.square += (differences**2).sum(axis=1)
         self.count += both.shape[1]
         self.longest = max(self.longest, both.shape[1])
         t = np.linspace(-1.0, 1.0, both.shape[1])
+        # half the change along the line of least squares: the mean of t^2 from -1 to 1 is 1/3
         slope = 3.0 * float(np.mean(t * (stretch.position - stretch.position[0])))
         self.drift = max(self.drift, 2.0 * abs(slope))
 

@@ -167,8 +167,8 @@ class CsvRecord(Record):
         _, header = next(rows)
         for line, cells in rows:
             for name in self.names:
-                at = header.index(name)
-                cell = cells[at] if at < len(cells) else ""
+                place = header.index(name)
+                cell = cells[place] if place < len(cells) else ""
                 if name not in self.text and not _is_number(cell):
                     text = f"must be a number, got {cell[:60]!r}"
                     faults.append(Fault(self.label, f"line {line}: {name}", text))
@@ -188,7 +188,7 @@ def read_record(path: str | os.PathLike[str], wanted: Columns) -> Record:
     try:
         head = read_head(file, HEADER)
         if file.suffix.lower() == ".mat":
-            return _matlab(file, head, wanted)
+            return _matlab_record(file, head, wanted)
         text = decode(head[: head.rfind(b"\n") + 1] or head)
     except FileError as error:
         raise fail(str(file), "", f"{error}; give a CSV or .mat file with columns {wanted.listed}") from None
@@ -236,7 +236,7 @@ def record_of(columns: Mapping[str, ArrayLike] | Any, wanted: Columns, label: st
     return ArrayRecord(arrays, label, [name for name in names if name in wanted.text])
 
 
-def _matlab(path: Path, head: bytes, wanted: Columns) -> Record:
+def _matlab_record(path: Path, head: bytes, wanted: Columns) -> Record:
     """The record in a .mat file, `head` its first bytes. Raises DeviceError for a format that is not read."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -305,19 +305,19 @@ def averaged_rows(record: Record, most: int = MOST_ROWS) -> AveragedRows:
     Memory stays below that of 2 * `most` rows and one piece.
     """
     kept, rows, together, left_out = list[Piece](), 0, 1, 0
-    rest: Piece = {name: np.zeros(0) for name in record.names}
+    remainder: Piece = {name: np.zeros(0) for name in record.names}
     for piece in record.pieces():
         whole = np.all([np.isfinite(v) for name, v in piece.items() if name not in record.text], axis=0)
         left_out += int(np.count_nonzero(~whole))
         piece = {
-            name: np.concatenate([rest[name], values[whole]]) if len(rest[name]) else values[whole]
+            name: np.concatenate([remainder[name], values[whole]]) if len(remainder[name]) else values[whole]
             for name, values in piece.items()
         }
         count = len(piece[record.names[0]]) // together * together
-        rest = {name: values[count:] for name, values in piece.items()}
+        remainder = {name: values[count:] for name, values in piece.items()}
         kept.append(_averaged(piece, count, together))
         rows += count // together
-        while rows > most and not record.text:
+        while rows > most and not record.text:  # pairs are averaged once more
             even = rows // 2 * 2
             kept = [_averaged(_joined(kept, record.names), even, 2)]
             rows, together = even // 2, 2 * together
@@ -383,7 +383,7 @@ class TableWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close the temporary file, unless it was handed over."""
-        self._drop()
+        self._close()
 
     def add(self, piece: Mapping[str, NDArray[Any]]) -> None:
         """Write the next rows."""
@@ -391,15 +391,15 @@ class TableWriter:
             return
         block = np.empty((len(piece[self._names[0]]), len(self._names)))
         for number, name in enumerate(self._names):
-            block[:, number] = self._numbers(name, piece[name]) if name in self._places else piece[name]
+            block[:, number] = self._places_of_words(name, piece[name]) if name in self._places else piece[name]
         self._rows += len(block)
         if any(len(known) > MOST_WORDS for known in self._places.values()):
-            self._drop()
+            self._close()
             return
         try:
             self._stream.write(block.data)
         except OSError:
-            self._drop()
+            self._close()
 
     def copy(self) -> TableCopy | None:
         """Hand over what was written; None where it could not be."""
@@ -407,7 +407,7 @@ class TableWriter:
         words = {name: list(known) for name, known in self._places.items()}
         return None if stream is None else TableCopy(stream, self._names, words, self._rows)
 
-    def _numbers(self, name: str, values: NDArray[Any]) -> Ints:
+    def _places_of_words(self, name: str, values: NDArray[Any]) -> Ints:
         """Places (n,) of words in the column's list, new ones put at its end, as long as they are few."""
         known = self._places[name]
         places = np.full(len(values), -1)
@@ -419,7 +419,7 @@ class TableWriter:
             places[left[values[left] == word]] = known[word]
         return places
 
-    def _drop(self) -> None:
+    def _close(self) -> None:
         """Close the temporary file and write no more."""
         if self._stream is not None:
             self._stream.close()
@@ -493,7 +493,7 @@ class Columns:
             faults.append(twice)
         if faults and not any(" is there: " in fault for fault in faults):
             separated = header_fault(names, chosen or ["?"]).partition(": ")[2] if len(names) == 1 else ""
-            faults.append(separated or _no_header(names) or f"needed are {self.listed}")
+            faults.append(separated or _header_fault(names) or f"needed are {self.listed}")
         return chosen, "; ".join(faults)
 
     @staticmethod
@@ -527,7 +527,7 @@ def plain_name(name: str) -> str:
     return f"{quantity.replace(' ', '_')}_{unit.replace('/', '_per_')}"
 
 
-def _no_header(names: Sequence[str]) -> str:
+def _header_fault(names: Sequence[str]) -> str:
     """Message: what stands where the names of columns should; "" where names do."""
     if names and names[0].startswith(("#", "%", "//")):
         return "the line is a comment; begin with the line that names the columns"

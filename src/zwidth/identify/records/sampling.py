@@ -102,6 +102,7 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
     if not usual > 0.0:
         what = "falls; sort the rows by rising time" if usual < 0.0 else f"stands still; {MORE_DIGITS}"
         return _failed(f"time_s of {record.label} {what}")
+    # runs: rows at which stretches begin and end; sums as `_sample_times` takes them
     row, missing, uneven, sums, runs = 0, 0, 0, np.zeros(3), list[Ints]()
     last, last_whole, first_uneven = np.nan, False, -1
     for piece in chain([first], pieces):
@@ -111,14 +112,16 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
         falling = np.flatnonzero(steps <= 0.0)
         if len(falling):
             return _failed(_fault_of_order(record, time, row, int(falling[0])))
+        # multiples of the usual step: one where no sample is missing
         many = np.rint(np.where(np.isfinite(steps), steps, 1.0))
-        off = np.flatnonzero(np.isfinite(steps) & (np.abs(steps - many) > UNEVEN) | (many < 1.0))
-        uneven += len(off)
-        first_uneven = row + int(off[0]) if len(off) and first_uneven < 0 else first_uneven
+        off_rows = np.flatnonzero(np.isfinite(steps) & (np.abs(steps - many) > UNEVEN) | (many < 1.0))
+        uneven += len(off_rows)
+        first_uneven = row + int(off_rows[0]) if len(off_rows) and first_uneven < 0 else first_uneven
         missing += int(np.sum(many - 1.0) + np.sum(~whole))
         even = steps[np.isfinite(steps) & (many == 1.0)]
         sums += len(even), np.sum(even - 1.0), np.sum((even - 1.0) ** 2)
         before = np.append(last_whole, whole[:-1])
+        # a stretch begins with a whole row behind a gap or a broken one, and ends before such a one
         runs.append(row + np.flatnonzero(whole & ~(before & (many == 1.0))))
         runs.append(row + np.flatnonzero(before & ~(whole & (many == 1.0))))
         last, last_whole, row = float(piece["time_s"][-1]), bool(whole[-1]), row + len(whole)
@@ -132,7 +135,7 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
 
 
 def _failed(reason: str) -> tuple[None, Check]:
-    """Return no sampling, and the check that failed for this reason."""
+    """Return no sampling, None, and the check that failed for this reason."""
     return None, Check("sampling", False, reason)
 
 

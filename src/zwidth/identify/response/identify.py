@@ -58,7 +58,7 @@ def identify_response(
     Raises       DeviceError  for records that cannot be read
     """
     period = device.controller.sampling_period
-    checks, sweeps = _sweeps(records, period)
+    checks, sweeps = _checked_sweeps(records, period)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     fitted, once = _fitted_samples(sweeps)
@@ -73,8 +73,8 @@ def identify_response(
     except ResponseError as error:
         checks.append(Check("response", False, f"{records[0].label} {error}"))
         return Identification(KIND, device.label, tuple(checks))
-    response = _together(responses)
-    checks.append(_usable(response))
+    response = _mean_response(responses)
+    checks.append(_check_coherence(response))
     columns = next(one for one in FORCES if one in records[0]), "position_m"
     if checks[-1].passed:
         checks += check_responses(device, responses, [record.label for record in records], columns)
@@ -90,7 +90,7 @@ def identify_response(
     return _charted(device, checks, responses, response, share, validated_on)
 
 
-def _sweeps(records: Sequence[Record], period: float) -> tuple[list[Check], list[SweepBlocks]]:
+def _checked_sweeps(records: Sequence[Record], period: float) -> tuple[list[Check], list[SweepBlocks]]:
     """Check the sampling and the columns of each record.
 
     period   of the device's computer [s]
@@ -105,14 +105,14 @@ def _sweeps(records: Sequence[Record], period: float) -> tuple[list[Check], list
             continue
         name = next(one for one in FORCES if one in record)
         sweep = SweepBlocks.longest(record, sampling, name, "position_m")
-        checks.append(replace(_gaps(len(sweep), sampling.rows), what=_named("gaps", record, records)))
+        checks.append(replace(_check_gaps(len(sweep), sampling.rows), what=_named("gaps", record, records)))
         checks += [replace(one, what=_named(one.what, record, records)) for one in _check_sweep(sweep)]
         sweeps.append(sweep)
     return checks, sweeps
 
 
 def _fitted_samples(sweeps: Sequence[SweepBlocks]) -> tuple[int, bool]:
-    """Choose how many samples of each sweep are fitted.
+    """Choose how many samples of each sweep, from its beginning, are fitted.
 
     Returns  their number, and whether each frequency is there at one time only
     """
@@ -141,7 +141,7 @@ def _charted(
     chart, why = _chart(response, device.controller)
     checks.append(Check("chart", chart is not None, why))
     if chart is None:
-        return Identification(KIND, device.label, tuple(checks), curves=_columns(responses))
+        return Identification(KIND, device.label, tuple(checks), curves=_response_columns(responses))
     return Identification(
         KIND,
         device.label,
@@ -150,7 +150,7 @@ def _charted(
         share,
         validated_on,
         tuple(_remarks(chart, device, response)),
-        _columns(responses),
+        _response_columns(responses),
         {"averages": response.averages, "integrators": chart.integrators, "measurement": response.note},
     )
 
@@ -170,7 +170,7 @@ def _reported(
         yield block
 
 
-def _gaps(kept: int, rows: int) -> Check:
+def _check_gaps(kept: int, rows: int) -> Check:
     """Check that the longest stretch without a gap, `kept` rows, is half of the record's rows or more."""
     said = (
         "no sample is missing"
@@ -206,7 +206,7 @@ def _check_sweep(sweep: SweepBlocks) -> list[Check]:
     return [*checks, Check("saturation", not clipped, reason)]
 
 
-def _together(responses: Sequence[Response]) -> Response:
+def _mean_response(responses: Sequence[Response]) -> Response:
     """Repeated sweeps as one response: their mean, with each of them in `sweeps`."""
     if len(responses) == 1:
         return responses[0]
@@ -214,7 +214,7 @@ def _together(responses: Sequence[Response]) -> Response:
     return replace(responses[0], value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps)
 
 
-def _usable(response: Response) -> Check:
+def _check_coherence(response: Response) -> Check:
     """Check that enough frequencies are coherent, and say from where to where."""
     assert response.coherence is not None
     good = response.coherence >= LEAST_COHERENCE
@@ -284,17 +284,22 @@ def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[s
         f"{response.averages:.4g}, integrators = {chart.integrators}"
     )
     if device.response is None:
-        own = device.at().chart(decay=False).stiffness_max
+        own_stiffness = device.at().chart(decay=False).stiffness_max
         high = chart.band.stiffness_high if chart.band is not None else chart.stiffness_max
-        within = "within" if chart.stiffness_max <= own <= high else "outside"
-        said.append(f"the file's own model renders {own:.5g} N/m at its reference, {within} this interval")
+        within = "within" if chart.stiffness_max <= own_stiffness <= high else "outside"
+        said.append(
+            f"the file's own model renders {own_stiffness:.5g} N/m at its reference, {within} this interval"
+        )
     return said
 
 
 def _shares_of_others(
     responses: Sequence[Response], sweeps: Sequence[SweepBlocks], length: int, period: float
 ) -> list[float]:
-    """Share of each sweep's motion that the response of the one before predicts; [] of a single sweep."""
+    """Share of each sweep's motion that the response of the one before predicts; [] of a single sweep.
+
+    length  of the blocks that are transformed at once [samples];   period  [s]
+    """
     if len(sweeps) == 1:
         return []
     before = [responses[-1], *responses[:-1]]
@@ -302,7 +307,10 @@ def _shares_of_others(
 
 
 def _validated_on(sweeps: int, once: bool) -> str:
-    """Which motion the share that is explained belongs to, in words."""
+    """Which motion the share that is explained belongs to, in words.
+
+    sweeps  how many there are;   once  each frequency is there at one time only
+    """
     where = "at the frequencies that can be relied on"
     if once and sweeps == 1:
         return "nothing: the sweep has each frequency at one time only"
@@ -320,14 +328,14 @@ def _share_explained(response: Response, unseen: SweepBlocks, length: int, perio
 
     length  of the blocks that are transformed at once, at most [samples]
     """
-    m = 2  # differences of the position
+    differences = 2  # of the position
     assert response.coherence is not None
     good = response.coherence >= LEAST_COHERENCE
     known, value = response.frequency[good], response.value[good]
-    shifted = value * (np.exp(2j * np.pi * known * period) - 1.0) ** m
+    shifted = value * (np.exp(2j * np.pi * known * period) - 1.0) ** differences
     missed = total = 0.0
     for force, position in unseen.blocks(min(length, len(unseen))):
-        moved = np.diff(position, n=m)
+        moved = np.diff(position, n=differences)
         window = np.hanning(len(moved))
         U, Y = np.fft.rfft(force[: len(moved)] * window), np.fft.rfft(moved * window)
         f = np.fft.rfftfreq(len(moved), period)
@@ -338,7 +346,7 @@ def _share_explained(response: Response, unseen: SweepBlocks, length: int, perio
     return 1.0 - missed / total
 
 
-def _columns(responses: Sequence[Response]) -> dict[str, Any]:
+def _response_columns(responses: Sequence[Response]) -> dict[str, Any]:
     """The columns of a file that a [response] reads."""
     parts = [(one.frequency, one.value, one.coherence) for one in responses]
     columns = {
@@ -370,14 +378,16 @@ def check_responses(
     if len(f) < FEWEST:
         return []
     slope = float(np.polyfit(np.log(f), np.log(size), 1, w=1.0 / np.sqrt(f))[0])
-    checks = [order_check(slope, float(f[-1] / f[0]), names), *_units(device, f, size)]
+    checks = [order_check(slope, float(f[-1] / f[0]), names), *_check_units(device, f, size)]
     if len(responses) > 1:
-        checks += _copies(responses, labels)
-        checks.append(flip_check([(label, _gain(first, r)) for r, label in zip(responses, labels, strict=True)]))
+        checks += _check_copies(responses, labels)
+        checks.append(
+            flip_check([(label, _times_as_far(first, r)) for r, label in zip(responses, labels, strict=True)])
+        )
     return checks
 
 
-def _copies(responses: Sequence[Response], labels: Sequence[str]) -> list[Check]:
+def _check_copies(responses: Sequence[Response], labels: Sequence[str]) -> list[Check]:
     """Fail where a sweep is another one again, to the last digit; [] where none is."""
     seen = dict[bytes, int]()
     for number, response in enumerate(responses):
@@ -397,15 +407,16 @@ def _coherent(response: Response) -> Flags:
     return (response.coherence >= LEAST_COHERENCE) & (np.abs(response.value) > 0.0) & (response.frequency > 0.0)
 
 
-def _gain(first: Response, other: Response) -> float:
-    """How many times as far a sweep moves as the first response says, median of the coherent frequencies."""
+def _times_as_far(first: Response, other: Response) -> float:
+    """How many times as far a sweep moves as the first response says, median of the coherent frequencies;
+    1 where there is none."""
     grid, known = other.frequency, _coherent(first)
     P = np.interp(grid, first.frequency[known], first.value[known])
     good = _coherent(other) & (np.abs(P) > 0.0)
     return float(np.median(np.real(other.value[good] / P[good]))) if good.any() else 1.0
 
 
-def _units(device: Device, f: Floats, size: Floats) -> list[Check]:
+def _check_units(device: Device, f: Floats, size: Floats) -> list[Check]:
     """Check that the response's magnitude (n,) [m/N], at frequencies f (n,) [Hz], is not off by the factor of a
     unit from that of the file's model; [] where it is not."""
     if device.response is not None or device.missing:
@@ -492,16 +503,16 @@ class SweepBlocks:
     def blocks(self, length: int) -> Iterator[tuple[Floats, Floats]]:
         """Force and position in blocks of one length, however the record is cut into pieces; what is left over at
         the end is left out."""
-        both, filled = np.empty((2, length)), 0
+        block, filled = np.empty((2, length)), 0  # force and position of the next block, and how many of them
         for values in self.pieces():
             used = 0
             while used < values.shape[1]:
-                some = values[:, used : used + length - filled]
-                both[:, filled : filled + some.shape[1]] = some
-                used, filled = used + some.shape[1], filled + some.shape[1]
+                part = values[:, used : used + length - filled]
+                block[:, filled : filled + part.shape[1]] = part
+                used, filled = used + part.shape[1], filled + part.shape[1]
                 if filled == length:
-                    yield both[0], both[1]
-                    both, filled = np.empty((2, length)), 0
+                    yield block[0], block[1]
+                    block, filled = np.empty((2, length)), 0
 
 
 @dataclass(frozen=True)
@@ -530,14 +541,16 @@ class SweepRange:
         force, position = next(sweep.blocks(min(len(sweep), FIRST)))
         step = encoder_step([position])
         levels = len(np.unique(force[:first_levels]))
+        # (2,) of force and position; and samples at the least and the largest force
         low, high, at_low, at_high = np.full(2, np.inf), np.full(2, -np.inf), 0, 0
         for values in sweep.pieces():
             least, most = np.minimum(low, np.min(values, axis=1)), np.maximum(high, np.max(values, axis=1))
+            # those counted before are at the extreme only where it has stayed
             at_low = (at_low if low[0] == least[0] else 0) + int(np.sum(values[0] == least[0]))
             at_high = (at_high if high[0] == most[0] else 0) + int(np.sum(values[0] == most[0]))
             low, high = least, most
-        ends = list(zip(low.tolist(), high.tolist(), strict=True))
-        return cls(ends[0], ends[1], at_high, at_low, levels, step)
+        force_and_position = list(zip(low.tolist(), high.tolist(), strict=True))
+        return cls(force_and_position[0], force_and_position[1], at_high, at_low, levels, step)
 
 
 SEGMENTS: Final = 8  # in the shorter part, whose spectra are averaged

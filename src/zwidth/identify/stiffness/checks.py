@@ -70,48 +70,49 @@ class StrokeRun:
 def check_runs(
     runs: Sequence[StrokeRun], known_step: float, known_stiffness: float | None
 ) -> tuple[list[Check], Resolution, bool]:
-    """The checks, the resolution of the angle, and whether the spring was bent both ways.
+    """The checks, the resolution of the angle, and whether the spring was bent both ways, False where that was not
+    looked at.
 
     known_step       of the encoder, from the device file [rad]; 0: read off the angles
     known_stiffness  of the drive in the device file [N m/rad]; None: none
 
     Later checks are left out where an earlier one fails without which they mean nothing.
     """
-    checks = [_rows(runs)]
+    checks = [_check_rows(runs)]
     if not checks[0].passed:
         return checks, Resolution(known_step, 0.0), False
-    constant = _constant(runs)
+    constant = _check_constant(runs)
     if constant is not None:
         checks.append(constant)
     nothing = Resolution(known_step, 0.0)
     if not all(check.passed for check in checks):
         return checks, nothing, False
-    resolution = _coarsest([resolution_of(run.angle[run.kept], known_step) for run in runs])
-    checks += [_missing(runs), _units(runs), _motion(runs, resolution)]
+    resolution = _coarsest_resolution([resolution_of(run.angle[run.kept], known_step) for run in runs])
+    checks += [_check_spikes(runs), _check_units(runs), _check_motion(runs, resolution)]
     if not all(check.passed or check.warning for check in checks):
         return checks, resolution, False
-    checks.append(_signs(runs))
+    checks.append(_check_signs(runs))
     if not checks[-1].passed:
         return checks, resolution, False
     strokes = joined_strokes(
         [strokes_of(run.torque[run.kept], run.angle[run.kept], resolution, i) for i, run in enumerate(runs)]
     )
-    checks.append(_strokes(strokes))
+    checks.append(_check_strokes(strokes))
     if not all(check.passed or check.warning for check in checks):
         return checks, resolution, False
-    checks += [_hysteresis(strokes), _ends(runs, resolution)]
+    checks += [_check_hysteresis(strokes), _check_ends(runs, resolution)]
     if known_stiffness is not None:
-        checks.append(_plausible(strokes, known_stiffness))
-    sides, both_sides = _sides(strokes)
+        checks.append(_check_against_file(strokes, known_stiffness))
+    sides, both_sides = _check_sides(strokes)
     return [*checks, sides], resolution, both_sides
 
 
-def _coarsest(found: Sequence[Resolution]) -> Resolution:
+def _coarsest_resolution(found: Sequence[Resolution]) -> Resolution:
     """The largest step and the largest noise of several runs."""
     return Resolution(max(one.step for one in found), max(one.noise for one in found))
 
 
-def _rows(runs: Sequence[StrokeRun]) -> Check:
+def _check_rows(runs: Sequence[StrokeRun]) -> Check:
     """Check that every run has enough readings."""
     short = [run for run in runs if len(run.angle) < FEWEST_ROWS]
     total = sum(len(run.angle) * run.together for run in runs)
@@ -127,7 +128,7 @@ def _rows(runs: Sequence[StrokeRun]) -> Check:
     return Check("length", True, f"{total} readings in {plural(len(runs), 'record')}{means}")
 
 
-def _constant(runs: Sequence[StrokeRun]) -> Check | None:
+def _check_constant(runs: Sequence[StrokeRun]) -> Check | None:
     """The failed check of a column that is constant; None where none is."""
     for run in runs:
         for name, values in (("torque_Nm", run.torque), ("angle_rad", run.angle)):
@@ -140,7 +141,7 @@ def _constant(runs: Sequence[StrokeRun]) -> Check | None:
     return None
 
 
-def _missing(runs: Sequence[StrokeRun]) -> Check:
+def _check_spikes(runs: Sequence[StrokeRun]) -> Check:
     """Check that few readings are spikes, and say what is left out."""
     left_out = sum(run.left_out for run in runs)
     spikes = sum(int(np.count_nonzero(~run.kept)) for run in runs)
@@ -157,7 +158,7 @@ def _missing(runs: Sequence[StrokeRun]) -> Check:
     return Check("readings", True, "; ".join(parts) or "all rows are numbers, without spikes")
 
 
-def _units(runs: Sequence[StrokeRun]) -> Check:
+def _check_units(runs: Sequence[StrokeRun]) -> Check:
     """Check that the angle of a blocked drive, in radians, runs over less than half a turn."""
     span = max(float(np.ptp(run.angle[run.kept])) for run in runs)
     if span > WIDEST:
@@ -170,7 +171,7 @@ def _units(runs: Sequence[StrokeRun]) -> Check:
     return Check("units", True, f"the angle runs over {span:.4g} rad")
 
 
-def _motion(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
+def _check_motion(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
     """Check that the angle runs over many counts and beyond its noise, in every run."""
     span = min(float(np.ptp(run.angle[run.kept])) for run in runs)
     if resolution.step and span < FEWEST_COUNTS * resolution.step:
@@ -195,7 +196,7 @@ def _motion(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
     return Check("motion", True, f"{counts}, with noise of {resolution.noise:.3g} rad")
 
 
-def _signs(runs: Sequence[StrokeRun]) -> Check:
+def _check_signs(runs: Sequence[StrokeRun]) -> Check:
     """Check that the torque grows with the angle in every run."""
     slopes = [float(np.polyfit(run.angle[run.kept], run.torque[run.kept], 1)[0]) for run in runs]
     falling = [run.label for run, slope in zip(runs, slopes, strict=True) if slope <= 0.0]
@@ -212,7 +213,7 @@ def _signs(runs: Sequence[StrokeRun]) -> Check:
     )
 
 
-def _strokes(strokes: Strokes) -> Check:
+def _check_strokes(strokes: Strokes) -> Check:
     """Check that the spring was both loaded and unloaded."""
     ways = set(strokes.sign.tolist())
     if strokes.count < 2 or len(ways) < 2:
@@ -226,25 +227,26 @@ def _strokes(strokes: Strokes) -> Check:
     return Check("loading and unloading", True, f"{plural(strokes.count, 'stroke')} between turning points")
 
 
-def _hysteresis(strokes: Strokes) -> Check:
+def _check_hysteresis(strokes: Strokes) -> Check:
     """Check that the torque is larger on the way up: the loop takes energy."""
     columns = np.stack([strokes.angle, strokes.sign, np.ones_like(strokes.sign)], axis=1)
-    solved, rest, *_ = np.linalg.lstsq(columns, strokes.torque, rcond=None)
-    spread = float(np.sqrt(rest[0] / len(strokes.sign))) if len(rest) else 0.0
+    (_, friction, _), squares, *_ = np.linalg.lstsq(columns, strokes.torque, rcond=None)
+    spread = float(np.sqrt(squares[0] / len(strokes.sign))) if len(squares) else 0.0
     span = float(np.ptp(strokes.torque))
-    if solved[1] < -max(4.0 * spread / np.sqrt(len(strokes.sign)), 1e-3 * span):
+    if friction < -max(4.0 * spread / np.sqrt(len(strokes.sign)), 1e-3 * span):
         return Check(
             "hysteresis",
             False,
-            f"the torque is smaller by {-2.0 * solved[1]:.3g} N m while the angle grows: the loop gives energy; "
+            f"the torque is smaller by {-2.0 * friction:.3g} N m while the angle grows: the loop gives energy; "
             "are torque "
             "and angle swapped, is the order of the rows reversed, or does the torque's reading lag behind?",
         )
-    return Check("hysteresis", True, f"the loop is {max(2.0 * solved[1], 0.0):.3g} N m wide")
+    return Check("hysteresis", True, f"the loop is {max(2.0 * friction, 0.0):.3g} N m wide")
 
 
-def _ends(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
+def _check_ends(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
     """Check that neither column stands still at its end while the other one goes on."""
+    # both columns at both ends, seen from above: with a sign of -1 the least value is the largest
     for run in runs:
         pairs = (("angle_rad", run.angle, run.torque), ("torque_Nm", run.torque, run.angle))
         for name, values, others in pairs:
@@ -273,17 +275,17 @@ def _held_share(values: Floats, others: Floats, end: float, margin: float) -> fl
         others = smoothed_torque(
             others, len(others) // SHORTEST_HOLD
         )  # the largest of many noisy readings is no rise
-    most, span = 0.0, float(np.ptp(others))
+    largest_rise, span = 0.0, float(np.ptp(others))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(np.int8), [0]])))
     for first, behind in edges.reshape(-1, 2):
-        stretch = others[first:behind]
-        most = max(most, float(np.max(stretch) - stretch[0]) / span)
+        held = others[first:behind]
+        largest_rise = max(largest_rise, float(np.max(held) - held[0]) / span)
     # within its last counts a spring bends on: that much of the other column's range belongs to it
     expected = margin / max(float(np.ptp(values)), 1e-300)
-    return most if most > HELD + 2.0 * expected else 0.0
+    return largest_rise if largest_rise > HELD + 2.0 * expected else 0.0
 
 
-def _plausible(strokes: Strokes, known: float) -> Check:
+def _check_against_file(strokes: Strokes, known: float) -> Check:
     """Check that the stiffness is within a factor of 20 of the file's [N m/rad]."""
     slope = float(np.polyfit(strokes.angle, strokes.torque, 1)[0])
     times = slope / known
@@ -302,8 +304,8 @@ def _plausible(strokes: Strokes, known: float) -> Check:
     )
 
 
-def _sides(strokes: Strokes) -> tuple[Check, bool]:
-    """Check whether the spring was bent both ways; and whether it was."""
+def _check_sides(strokes: Strokes) -> tuple[Check, bool]:
+    """Check whether the spring was bent both ways, a warning where not; and whether it was."""
     high, low = float(np.max(strokes.torque)), float(np.min(strokes.torque))
     lesser = min(max(high, 0.0), max(-low, 0.0)) / (high - low)
     if lesser < ONE_SIDED:

@@ -59,13 +59,16 @@ def identify_stiffness(
         for drives in [_runs_by_drive(device, records, joint)]
         for drive, runs in drives
     ]
-    return parts[0] if len(parts) == 1 else _together(parts)
+    return parts[0] if len(parts) == 1 else _joined_drives(parts)
 
 
 def _runs_by_drive(
     device: Device, records: Sequence[Record], joint: str | None
 ) -> list[tuple[Drive, list[StrokeRun]]]:
-    """The runs of each drive, in the order in which the drives appear."""
+    """The runs of each drive, in the order in which the drives appear.
+
+    joint  of all rows, where no column says it; None: of the only drive
+    """
     runs: dict[str, tuple[Drive, list[StrokeRun]]] = {}
     for record in records:
         rows = averaged_rows(record)
@@ -80,9 +83,9 @@ def _runs_by_drive(
             names = list(dict.fromkeys(rows.columns["joint"].tolist()))
         for name in names:
             drive = drive_named(device, name)
-            mine = slice(None) if "joint" not in record else rows.columns["joint"] == name
+            of_drive = slice(None) if "joint" not in record else rows.columns["joint"] == name
             label = record.label if len(names) == 1 else f"{record.label}, joint {name}"
-            run = StrokeRun(label, torque[mine], angle[mine], rows.together, rows.left_out)
+            run = StrokeRun(label, torque[of_drive], angle[of_drive], rows.together, rows.left_out)
             runs.setdefault(drive.path, (drive, []))[1].append(run)
     if not runs:
         raise records[0].fault("has no rows; record torque and angle")
@@ -119,7 +122,7 @@ def _identify_drive(device: Device, drive: Drive, runs: list[StrokeRun], side: s
     none = refused("stiffness", f"{device.name}, {drive.name}", checks)
     if none is not None:
         return none
-    strokes = _strokes(runs, resolution)
+    strokes = _strokes_of_runs(runs, resolution)
     fitted, unseen = _split(strokes)
     fit = fit_spring(fitted, resolution, both_sides)
     explained = _share_explained(fit, unseen)
@@ -129,13 +132,13 @@ def _identify_drive(device: Device, drive: Drive, runs: list[StrokeRun], side: s
         tuple(checks),
         tuple(replace(one, name=prefix + one.name) for one in _estimates(fit, fitted, drive, side)),
         explained,
-        f"the angle in {_parts(unseen)} that were not fitted, predicted from their torque",
+        f"the angle in {_amount(unseen)} that were not fitted, predicted from their torque",
         tuple(prefix + remark for remark in _remarks(fit, fitted, both_sides)),
         _curves(drive, fit, strokes, unseen),
     )
 
 
-def _strokes(runs: Sequence[StrokeRun], resolution: Resolution) -> Strokes:
+def _strokes_of_runs(runs: Sequence[StrokeRun], resolution: Resolution) -> Strokes:
     """The strokes of all runs, numbered one behind the other."""
     parts, first = list[Strokes](), 0
     for number, run in enumerate(runs):
@@ -146,18 +149,18 @@ def _strokes(runs: Sequence[StrokeRun], resolution: Resolution) -> Strokes:
 
 def _split(strokes: Strokes) -> tuple[Strokes, Strokes]:
     """The part that is fitted and the part that is predicted: the last strokes, of few strokes every third bin."""
-    _, number = np.unique(strokes.stroke, return_inverse=True)
-    count = int(number.max()) + 1
+    _, stroke = np.unique(strokes.stroke, return_inverse=True)  # index of each bin's stroke
+    count = int(stroke.max()) + 1
     if count < 6:
-        late = np.arange(len(number)) % 3 == 2
+        unseen = np.arange(len(stroke)) % 3 == 2
     else:
         # of every run the last strokes
-        late = np.zeros(len(number), dtype=bool)
+        unseen = np.zeros(len(stroke), dtype=bool)
         for run in np.unique(strokes.run):
-            mine = strokes.run == run
-            low, high = number[mine].min(), number[mine].max() + 1
-            late |= mine & (number >= low + max(round(FIT_SHARE * (high - low)), 1))
-    return strokes.select(~late), strokes.select(late)
+            of_run = strokes.run == run
+            low, high = stroke[of_run].min(), stroke[of_run].max() + 1
+            unseen |= of_run & (stroke >= low + max(round(FIT_SHARE * (high - low)), 1))
+    return strokes.select(~unseen), strokes.select(unseen)
 
 
 def _share_explained(fit: SpringFit, unseen: Strokes) -> float:
@@ -173,26 +176,31 @@ def _estimates(fit: SpringFit, strokes: Strokes, drive: Drive, side: str) -> Ite
     yield from _stiffness_estimates(fit, bend, drive)
     if "hardening" in fit.names:
         path = f"{drive.path}.hardening_Nm_per_rad3"
-        yield _estimate(fit, "hardening", fit["hardening"], {"hardening": 1.0}, "N m/rad^3", path)
+        yield _estimate_with_interval(fit, "hardening", fit["hardening"], {"hardening": 1.0}, "N m/rad^3", path)
     if fit["preload"] > 0.0:
-        yield _estimate(fit, "preload", fit["preload"], {"preload": 1.0}, "N m", f"{drive.path}.preload_Nm")
+        yield _estimate_with_interval(
+            fit, "preload", fit["preload"], {"preload": 1.0}, "N m", f"{drive.path}.preload_Nm"
+        )
     if "play" in fit.names:
-        yield _estimate(fit, "backlash", fit["play"], {"play": 1.0}, "rad")
-    friction = _estimate(fit, "dry friction", fit["friction"], {"friction": 1.0}, "N m")
+        yield _estimate_with_interval(fit, "backlash", fit["play"], {"play": 1.0}, "rad")
+    friction = _estimate_with_interval(fit, "dry friction", fit["friction"], {"friction": 1.0}, "N m")
     path = f"{drive.path}.coulomb_Nm" if side == "motor" and friction.low > 0.0 else ""
     yield replace(friction, low=max(friction.low, 0.0), value=max(friction.value, 0.0), path=path)
     if "load" in fit.names:
-        yield _estimate(fit, "friction per torque", fit["load"], {"load": 1.0}, "1")
+        yield _estimate_with_interval(fit, "friction per torque", fit["load"], {"load": 1.0}, "1")
     if "reversal" in fit.names:
-        yield _estimate(fit, "way over which friction turns", fit["reversal"], {"reversal": 1.0}, "rad")
+        yield _estimate_with_interval(
+            fit, "way over which friction turns", fit["reversal"], {"reversal": 1.0}, "rad"
+        )
+    # a cycle goes over the bend's range twice, against dry friction and that which grows with the torque
     way = 2.0 * float(np.ptp(bend))
     loaded = way * float(np.mean(np.abs(fit.elastic(np.linspace(np.min(bend), np.max(bend), 1001)))))
     lost = way * fit["friction"] + loaded * fit["load"]
-    loss = _estimate(fit, "hysteresis loss per cycle", lost, {"friction": way, "load": loaded}, "J")
+    loss = _estimate_with_interval(fit, "hysteresis loss per cycle", lost, {"friction": way, "load": loaded}, "J")
     yield replace(loss, low=max(loss.low, 0.0), value=max(loss.value, 0.0))
 
 
-def _estimate(
+def _estimate_with_interval(
     fit: SpringFit, name: str, value: float, gradient: dict[str, float], unit: str, path: str = ""
 ) -> Estimate:
     """Give a number its interval.
@@ -200,12 +208,13 @@ def _estimate(
     gradient  of the number by the fit's parameters
     path      in the device file; "" where the file has no key for it
     """
-    half = fit.half_width(gradient)
-    return Estimate(name, value, value - half, value + half, unit, path)
+    half_width = fit.half_width(gradient)
+    return Estimate(name, value, value - half_width, value + half_width, unit, path)
 
 
 def _stiffness_estimates(fit: SpringFit, bend: Floats, drive: Drive) -> Iterator[Estimate]:
-    """Give the stiffness of both ways, or of the one that was bent, and its largest and average value [N m/rad].
+    """Give the stiffness of both ways, each or one for both where they hardly differ, with its largest and average
+    value; or that of the one way that was bent [N m/rad].
 
     bend  (n,) of the spring [rad]
     """
@@ -217,21 +226,22 @@ def _stiffness_estimates(fit: SpringFit, bend: Floats, drive: Drive) -> Iterator
         halves = {"forward": 0.5, "backward": 0.5}
         unit = "N m/rad"
         if uneven:
-            yield _estimate(fit, "stiffness", forward, {"forward": 1.0}, unit, path)
+            yield _estimate_with_interval(fit, "stiffness", forward, {"forward": 1.0}, unit, path)
             other = f"{drive.path}.backward_stiffness_Nm_per_rad"
-            yield _estimate(fit, "backward stiffness", backward, {"backward": 1.0}, unit, other)
+            yield _estimate_with_interval(fit, "backward stiffness", backward, {"backward": 1.0}, unit, other)
         else:
-            yield _estimate(fit, "stiffness", 0.5 * (forward + backward), halves, unit, path)
+            yield _estimate_with_interval(fit, "stiffness", 0.5 * (forward + backward), halves, unit, path)
+        # at both ends of the bend: dT/dd = k + 3 k_3 d^2, and its derivative by k_3
         ends = {
             "forward": (forward + 3.0 * k3 * np.max(bend) ** 2, 3.0 * np.max(bend) ** 2),
             "backward": (backward + 3.0 * k3 * np.min(bend) ** 2, 3.0 * np.min(bend) ** 2),
         }
         stiffer = max(ends, key=lambda name: ends[name][0])
         gradient = {stiffer: 1.0, "hardening": float(ends[stiffer][1])}
-        yield _estimate(fit, "largest stiffness", float(ends[stiffer][0]), gradient, unit)
-        yield _estimate(fit, "average stiffness", 0.5 * (forward + backward), halves, unit)
+        yield _estimate_with_interval(fit, "largest stiffness", float(ends[stiffer][0]), gradient, unit)
+        yield _estimate_with_interval(fit, "average stiffness", 0.5 * (forward + backward), halves, unit)
     else:
-        yield _estimate(fit, "stiffness", forward, {"forward": 1.0}, "N m/rad", path)
+        yield _estimate_with_interval(fit, "stiffness", forward, {"forward": 1.0}, "N m/rad", path)
 
 
 def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str]:
@@ -281,12 +291,12 @@ def _curves(drive: Drive, fit: SpringFit, strokes: Strokes, unseen: Strokes) -> 
     }
 
 
-def _parts(strokes: Strokes) -> str:
+def _amount(strokes: Strokes) -> str:
     """How many strokes there are, in words; of few strokes how many averages."""
     return plural(strokes.count, "stroke") if strokes.count > 2 else plural(len(strokes.angle), "average")
 
 
-def _together(parts: Sequence[Identification]) -> Identification:
+def _joined_drives(parts: Sequence[Identification]) -> Identification:
     """Several drives as one result."""
     shares = [part.validation for part in parts if part.estimates]
     curves = {

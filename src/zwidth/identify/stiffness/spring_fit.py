@@ -68,7 +68,7 @@ class SpringFit:
         """Value of a parameter; 0 of one that was not fitted."""
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
 
-    def combination(self, gradient: dict[str, float]) -> float:
+    def standard_error(self, gradient: dict[str, float]) -> float:
         """Standard error of a function of the parameters with this gradient, derivatives by their names."""
         g = np.array([gradient.get(name, 0.0) for name in self.names])
         return float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
@@ -77,7 +77,7 @@ class SpringFit:
         """Half width of the 95 % interval of a function of the parameters with this gradient."""
         from scipy.stats import t
 
-        return float(t.ppf(0.975, self.freedom)) * self.combination(gradient)
+        return float(t.ppf(0.975, self.freedom)) * self.standard_error(gradient)
 
     def torque(self, strokes: Strokes) -> Floats:
         """The fitted torque (n,) of other strokes."""
@@ -90,7 +90,7 @@ class SpringFit:
 
     def elastic(self, bend: Floats) -> Floats:
         """Torque (n,) of the fitted spring at bends [rad], without friction."""
-        return _elastic(self.by_name, bend)
+        return _elastic_torque(self.by_name, bend)
 
     def bend(self, strokes: Strokes) -> Floats:
         """By how much the fitted spring is bent (n,) at the angles of strokes [rad]."""
@@ -101,7 +101,8 @@ class SpringFit:
         d = self.bend(strokes)
         reach = 2.0 * float(np.max(np.abs(d)))
         grid = np.linspace(-reach, reach, 4001)
-        torque = strokes.torque - _dry(self.by_name, strokes) - self["torque drift"] * strokes.time
+        torque = strokes.torque - _dry_friction(self.by_name, strokes) - self["torque drift"] * strokes.time
+        # T = g + s mu |g|: the spring's part of it
         torque = torque / (1.0 + self["load"] * strokes.sign * np.sign(torque))
         # across play every angle has the same torque: a small slope makes the inverse one
         elastic = self.elastic(grid) + 1e-9 * self["forward"] * grid
@@ -114,15 +115,15 @@ def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> Sp
     resolution  of the angle
     both_sides  whether the spring was bent both ways; else it has one stiffness
     """
-    names = (*(BASE if both_sides else ("forward", "rest", "friction")), *_rests(strokes))
+    names = (*(BASE if both_sides else ("forward", "rest", "friction")), *_rest_names(strokes))
     good = np.ones(len(strokes.angle), dtype=bool)
-    fit = _fit(names, strokes, resolution, good)
+    fit = _fit_parameters(names, strokes, resolution, good)
     for _ in range(len(EXTENSIONS) + 1):
-        good &= ~_outliers(fit.residuals, good)
+        good &= ~_far_outliers(fit.residuals, good)
         kept = good & ~_across_kink(fit, strokes)
         if np.count_nonzero(kept) <= len(fit.names):
             kept = good
-        fit = _fit(fit.names, strokes, resolution, kept, fit)
+        fit = _fit_parameters(fit.names, strokes, resolution, kept, fit)
         better = _best_extension(fit, strokes, resolution, kept, both_sides)
         if better is None:
             break
@@ -133,17 +134,20 @@ def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> Sp
 def _best_extension(
     fit: SpringFit, strokes: Strokes, resolution: Resolution, kept: Flags, both_sides: bool
 ) -> SpringFit | None:
-    """The fit with one more parameter that brings most, of those that differ from zero; None if none does."""
+    """The fit with one more parameter that brings most, of those that differ from zero; None if none does.
+
+    kept  (n,) bins that are used;   both_sides  whether the spring was bent both ways
+    """
     best, least = None, float(np.sum(fit.residuals[kept] ** 2))
     limit = WORTH * least
     for name in EXTENSIONS:
         alternative = any({name, *fit.names} >= pair for pair in EXCLUSIVE)
         if name in fit.names or alternative or (name == "preload" and not both_sides):
             continue
-        tried = _fit((*fit.names, name), strokes, resolution, kept, fit)
-        rest = float(np.sum(tried.residuals[kept] ** 2))
-        if rest < limit and _is_seen(tried, name, strokes):
-            best, limit = tried, rest
+        tried = _fit_parameters((*fit.names, name), strokes, resolution, kept, fit)
+        squares = float(np.sum(tried.residuals[kept] ** 2))
+        if squares < limit and _is_seen(tried, name, strokes):
+            best, limit = tried, squares
     return best
 
 
@@ -153,61 +157,64 @@ def _is_seen(fit: SpringFit, name: str, strokes: Strokes) -> bool:
     change = {"forward": 1.0, "backward": -1.0}
     if name == "preload":
         low, high = np.min(fit.bend(strokes)), np.max(fit.bend(strokes))
+        # where the kink lies between the least and the largest bend, as a share
         place = (-fit["preload"] / fit["forward"] - low) / (high - low)
         if not (
-            END < place < 1.0 - END and abs(fit["forward"] - fit["backward"]) > SEEN * fit.combination(change)
+            END < place < 1.0 - END and abs(fit["forward"] - fit["backward"]) > SEEN * fit.standard_error(change)
         ):
             return False
-    return abs(fit[name]) > SEEN * fit.combination({name: 1.0})
+    return abs(fit[name]) > SEEN * fit.standard_error({name: 1.0})
 
 
-def _elastic(x: dict[str, float], d: Floats, reach: Floats | float = 0.0) -> Floats:
+def _elastic_torque(x: dict[str, float], d: Floats, reach: Floats | float = 0.0) -> Floats:
     """Mean torque (n,), without friction, of a spring with parameters x bent by angles spread evenly over d +-
     reach (n,) [rad], on one side of its kinks."""
     forward = x["forward"]
     backward = x.get("backward", forward)
-    half, change = 0.5 * x.get("play", 0.0), -x.get("preload", 0.0) / forward
-    above = change + np.maximum(d - half - change, 0.0)
-    below = -np.maximum(change - d - half, 0.0)
+    half_play, kink = 0.5 * x.get("play", 0.0), -x.get("preload", 0.0) / forward
+    # parts of the bend that have the forward stiffness, and the backward one
+    above = kink + np.maximum(d - half_play - kink, 0.0)
+    below = -np.maximum(kink - d - half_play, 0.0)
+    # the mean of (d + e)^3 over e from -reach to reach is d^3 + d reach^2
     return np.asarray(forward * above + backward * below + x.get("hardening", 0.0) * (d**3 + d * reach**2))
 
 
 def _across_kink(fit: SpringFit, strokes: Strokes) -> Flags:
     """Bins (n,) of several readings over a kink of the fitted spring, whose mean torque is not that of their mean
     angle."""
-    half = 0.5 * fit["play"]
-    kinks = (-half, half) if half else (-fit["preload"] / fit["forward"],)
+    half_play = 0.5 * fit["play"]
+    kinks = (-half_play, half_play) if half_play else (-fit["preload"] / fit["forward"],)
     d = fit.bend(strokes)
     over = np.any([np.abs(d - kink) <= 1.2 * strokes.reach for kink in kinks], axis=0)
     return np.asarray(over & (strokes.samples > 1) & ("backward" in fit.names))
 
 
-def _rests(strokes: Strokes) -> list[str]:
+def _rest_names(strokes: Strokes) -> list[str]:
     """Names of the rest angles of the records after the first."""
     return [f"rest of record {run}" for run in range(1, int(np.max(strokes.run, initial=0)) + 1)]
 
 
 def _bend(x: dict[str, float], strokes: Strokes) -> Floats:
     """By how much a spring with parameters x is bent (n,) [rad]."""
-    rests = np.array([x["rest"], *(x.get(name, x["rest"]) for name in _rests(strokes))])
+    rests = np.array([x["rest"], *(x.get(name, x["rest"]) for name in _rest_names(strokes))])
     return np.asarray(strokes.angle - rests[strokes.run] - x.get("angle drift", 0.0) * strokes.time)
 
 
 def _torque(names: tuple[str, ...], values: Floats, strokes: Strokes) -> Floats:
     """Torque (n,) of strokes by the spring, dry friction and drift with these parameters (p,)."""
     x = dict(zip(names, values.tolist(), strict=True))
-    elastic = _elastic(x, _bend(x, strokes), strokes.reach)
+    elastic = _elastic_torque(x, _bend(x, strokes), strokes.reach)
     loaded = x.get("load", 0.0) * np.abs(elastic) * strokes.sign
-    return np.asarray(elastic + _dry(x, strokes) + loaded + x.get("torque drift", 0.0) * strokes.time)
+    return np.asarray(elastic + _dry_friction(x, strokes) + loaded + x.get("torque drift", 0.0) * strokes.time)
 
 
-def _dry(x: dict[str, float], strokes: Strokes) -> Floats:
+def _dry_friction(x: dict[str, float], strokes: Strokes) -> Floats:
     """Dry friction (n,) that the torque overcomes, by parameters x, without what grows with the torque."""
     turned = 1.0 - 2.0 * np.exp(-strokes.since / x["reversal"]) if "reversal" in x else 1.0
     return np.asarray(x["friction"] * strokes.sign * turned)
 
 
-def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -> tuple[Floats, Floats]:
+def _start_and_sizes(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -> tuple[Floats, Floats]:
     """Parameters (p,) where the search begins, and by how much each is likely to differ (p,).
 
     before  a fit with fewer parameters; None: none yet
@@ -218,16 +225,16 @@ def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -
         (k, friction, offset), *_ = np.linalg.lstsq(columns, strokes.torque, rcond=None)
         k = k if k != 0.0 else span_torque / span_angle
         guess = {"forward": k, "backward": k, "rest": -offset / k, "friction": friction}
-        guess |= dict.fromkeys(_rests(strokes), guess["rest"])
+        guess |= dict.fromkeys(_rest_names(strokes), guess["rest"])
     else:
         guess = dict(zip(before.names, before.values.tolist(), strict=True))
-    usual = abs(guess["forward"])
+    stiffness = abs(guess["forward"])
     sizes = {
-        "forward": usual,
-        "backward": usual,
+        "forward": stiffness,
+        "backward": stiffness,
         "rest": span_angle,
         "friction": 0.1 * span_torque,
-        "hardening": usual / span_angle**2,
+        "hardening": stiffness / span_angle**2,
         "play": 0.05 * span_angle,
         "preload": 0.1 * span_torque,
         "load": 0.1,
@@ -235,15 +242,16 @@ def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -
         "angle drift": 0.1 * span_angle,
         "torque drift": 0.1 * span_torque,
     }
-    sizes |= dict.fromkeys(_rests(strokes), span_angle)
-    first = {"play": 0.05 * span_angle, "preload": 0.1 * span_torque, "reversal": 0.05 * span_angle}
+    sizes |= dict.fromkeys(_rest_names(strokes), span_angle)
+    # where those extensions begin that do not begin at 0
+    from_zero = {"play": 0.05 * span_angle, "preload": 0.1 * span_torque, "reversal": 0.05 * span_angle}
     return (
-        np.array([guess.get(name, first.get(name, 0.0)) for name in names]),
+        np.array([guess.get(name, from_zero.get(name, 0.0)) for name in names]),
         np.array([sizes[name] for name in names]),
     )
 
 
-def _fit(
+def _fit_parameters(
     names: tuple[str, ...],
     strokes: Strokes,
     resolution: Resolution,
@@ -255,7 +263,7 @@ def _fit(
     from scipy.optimize import least_squares
 
     used = strokes.select(kept)
-    start, size = _start(names, used, before)
+    start, size = _start_and_sizes(names, used, before)
     least = {"play": 0.0, "load": 0.0, "reversal": SHORTEST * float(np.ptp(strokes.angle))}
     lower = np.array([least.get(name, -np.inf) for name in names]) / size
     scale = max(float(np.ptp(used.torque)), 1e-300)
@@ -273,7 +281,8 @@ def _fit(
 def _covariance(
     jacobian: Floats, strokes: Strokes, residuals: Floats, resolution: Resolution
 ) -> tuple[Floats, int]:
-    """Covariance (p, p) of the parameters' errors by the torque's derivatives (n, p); the freedom of its estimate.
+    """Covariance (p, p) of the parameters' errors by the torque's derivatives (n, p) and residuals (n,); and its
+    degrees of freedom.
 
     From the scatter between clusters, as by deleting each in turn (jackknife, in its first order), so that errors
     within a cluster may depend on each other; and from the rounding of the angle, which is the same in every
@@ -283,10 +292,13 @@ def _covariance(
     pseudo = np.linalg.pinv(jacobian)  # (p, n)
     number = int(cluster.max()) + 1
     changes = np.empty((number, jacobian.shape[1]))
-    for which in range(number):
-        rows = np.flatnonzero(cluster == which)
-        left = np.eye(len(rows)) - jacobian[rows] @ pseudo[:, rows]
-        changes[which] = pseudo[:, rows] @ np.linalg.lstsq(left, residuals[rows], rcond=None)[0]
+    for number_of_cluster in range(number):
+        rows = np.flatnonzero(cluster == number_of_cluster)
+        # the residuals of a cluster as they would be without it in the fit
+        without_itself = np.eye(len(rows)) - jacobian[rows] @ pseudo[:, rows]
+        changes[number_of_cluster] = (
+            pseudo[:, rows] @ np.linalg.lstsq(without_itself, residuals[rows], rcond=None)[0]
+        )
     scatter = (number - 1.0) / number * changes.T @ changes
     freedom = max(number - jacobian.shape[1], 1)
     return np.asarray(scatter + _rounding(np.asarray(pseudo, dtype=float), strokes, resolution)), freedom
@@ -303,10 +315,13 @@ def _rounding(pseudo: Floats, strokes: Strokes, resolution: Resolution) -> Float
     if resolution.step == 0.0:
         return np.zeros((len(pseudo), len(pseudo)))
     rise = np.polyfit(strokes.angle, strokes.torque, 1)[0]
-    moved = 2.0 * strokes.reach / resolution.step
+    counts_covered = 2.0 * strokes.reach / resolution.step
     dither = np.exp(-2.0 * (np.pi * resolution.noise / resolution.step) ** 2)
-    averaged = np.maximum(1.0, np.where(moved > strokes.samples, np.sqrt(strokes.samples), moved))
+    averaged = np.maximum(
+        1.0, np.where(counts_covered > strokes.samples, np.sqrt(strokes.samples), counts_covered)
+    )
     error = abs(rise) * resolution.step / np.sqrt(12.0) * dither / averaged
+    # a number for each count and sign of motion
     cell = np.rint(strokes.angle / resolution.step).astype(np.int64) * 2 + (strokes.sign > 0)
     _, which = np.unique(cell, return_inverse=True)
     parts = np.zeros((int(which.max()) + 1, len(pseudo)))
@@ -315,7 +330,10 @@ def _rounding(pseudo: Floats, strokes: Strokes, resolution: Resolution) -> Float
 
 
 def _clusters(strokes: Strokes) -> Ints:
-    """A number (n,) for each bin: bins of one cluster are not independent. Strokes, cut where they are few."""
+    """Number (n,) of each bin's cluster: errors within one may depend on each other.
+
+    A cluster is a stroke; several strokes where there are very many, a part of one where there are few.
+    """
     _, stroke = np.unique(strokes.stroke, return_inverse=True)
     count = int(stroke.max()) + 1
     if count >= FEWEST_STROKES:
@@ -328,12 +346,15 @@ def _clusters(strokes: Strokes) -> Ints:
     return np.unique(label, return_inverse=True)[1]
 
 
-def _outliers(residuals: Floats, kept: Flags) -> Flags:
-    """Kept bins that lie far from all others; none where they are many, since then the model is wrong."""
+def _far_outliers(residuals: Floats, kept: Flags) -> Flags:
+    """Kept bins (n,) that lie far from all others; none where they are many, since then the model is wrong.
+
+    residuals, kept  (n,) of all bins
+    """
     middle = float(np.median(residuals[kept]))
     spread = 1.4826 * float(np.median(np.abs(residuals[kept] - middle)))  # robust standard deviation
-    bad = kept & (np.abs(residuals - middle) > OUTLIER * max(spread, 1e-300))
-    return bad if np.count_nonzero(bad) <= MOST_OUTLIERS * len(residuals) else np.zeros_like(bad)
+    far = kept & (np.abs(residuals - middle) > OUTLIER * max(spread, 1e-300))
+    return far if np.count_nonzero(far) <= MOST_OUTLIERS * len(residuals) else np.zeros_like(far)
 
 
 BINS: Final = 24  # of a stroke
@@ -450,39 +471,40 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
     threshold = max(LEAST_TURN * span, TURN_COUNTS * resolution.step, TURN_NOISE * resolution.noise)
     stuck = max(STUCK_COUNTS * resolution.step, STUCK_NOISE * resolution.noise)
     turns = turning_points(angle, threshold)
-    columns = list[tuple[float, ...]]()
+    columns = list[tuple[float, ...]]()  # a row for each bin, as `Strokes` has the columns
     number = first
     for start, end in pairwise(turns):
         sign = 1.0 if angle[end] > angle[start] else -1.0
-        rows = start + _moving(sign * torque[start : end + 1], sign * angle[start : end + 1], stuck)
+        rows = start + _moving_rows(sign * torque[start : end + 1], sign * angle[start : end + 1], stuck)
         if len(rows) < 2:
             continue
         for part in np.array_split(rows, min(max(MOST_BINS // (len(turns) - 1), FEWEST_BINS), BINS, len(rows))):
             place = float(np.mean(part)) / max(len(angle) - 1, 1)
             reach = 0.5 * abs(float(angle[part[-1]] - angle[part[0]])) if len(part) > 1 else 0.0
-            mean = float(np.mean(torque[part])), float(np.mean(angle[part]))
-            way = abs(mean[1] - float(angle[start])) if start else np.inf
-            columns.append((*mean, reach, len(part), sign, number, place, run, way))
+            mean_torque, mean_angle = float(np.mean(torque[part])), float(np.mean(angle[part]))
+            way = abs(mean_angle - float(angle[start])) if start else np.inf
+            columns.append((mean_torque, mean_angle, reach, len(part), sign, number, place, run, way))
         number += 1
     torques, angles, reaches, samples, signs, numbers, places, runs, since = np.array(columns).reshape(-1, 9).T
-    whole = numbers.astype(np.int64), runs.astype(np.int64)
-    return Strokes(torques, angles, reaches, samples, signs, whole[0], places, whole[1], since)
+    stroke, record = numbers.astype(np.int64), runs.astype(np.int64)
+    return Strokes(torques, angles, reaches, samples, signs, stroke, places, record, since)
 
 
-def _moving(torque: Floats, angle: Floats, stuck: float) -> Ints:
+def _moving_rows(torque: Floats, angle: Floats, stuck: float) -> Ints:
     """Rows of a rising stroke (n,) in which the shaft moves: from where it has left its turning point by more than
     `stuck` up to the largest torque, behind which friction holds it again.
 
     The largest of a smoothed torque may be late by half of what is smoothed over.
     """
-    width = max(len(torque) // SMOOTHED, 1) | 1
+    width = max(len(torque) // SMOOTHED, 1) | 1  # odd
     free = angle - angle[0] > stuck
     first = int(np.argmax(free)) if free.any() else len(angle)
     return np.arange(first, int(np.argmax(smoothed_torque(torque, width))) + 1 - width // 2)
 
 
 def smoothed_torque(values: Floats, width: int) -> Floats:
-    """Moving average of values (n,) over so many, an odd number, those at the ends repeated."""
+    """Moving average of values (n,) over `width` of them, the next odd number of an even one, those at the ends
+    repeated."""
     width = max(width, 1) | 1
     padded = np.pad(values, width // 2, mode="edge")
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
