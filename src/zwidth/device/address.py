@@ -79,6 +79,7 @@ def in_schema(path: str) -> bool:
     """Whether a path of keys, with * for list elements, leads to a key the schema has, given or not."""
     steps: KeyPath = ()
     for part in path.split("."):
+        # what is no key of a table must be * for the elements of a list, of which the first stands for all
         steps = (*steps, part) if schema.subschemas((*steps, part)) else (*steps, 0)
         if not schema.subschemas(steps) or (steps[-1] == 0 and part != "*"):
             return False
@@ -89,8 +90,7 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """A copy of the document with one value set (`UNSET`: removed); exclusive keys are dropped.
 
     A table of kinds whose keys of the other kind are dropped, or a new one, gets the `type` that the key belongs
-    to; a velocity
-    that gets another `method` keeps of its keys those that the method reads.
+    to; a velocity that gets another `method` keeps of its keys those that the method reads.
 
     Raises DeviceError  if the schema has no such path, or a list no such element
     """
@@ -105,11 +105,11 @@ def assign_all(document: dict[str, Any], settings: Iterable[tuple[str, Any]]) ->
     """
     document = deep_copy(document)
     for path, value in settings:
-        _set(document, path, value)
+        _set_in_place(document, path, value)
     return document
 
 
-def _set(document: dict[str, Any], path: str, value: Any) -> None:
+def _set_in_place(document: dict[str, Any], path: str, value: Any) -> None:
     """Set the value at a path of the document, in place; `UNSET` removes it. Missing outer tables are made; keys
     that exclude the new one, or that a new method does not read, are removed."""
     *outer, last = resolve(document, path)
@@ -168,9 +168,9 @@ def parse(setting: str | tuple[str, Any]) -> tuple[str, Any]:
         path, equals, text = setting.partition("=")
         if not equals or not path.strip():
             raise fail(SETTINGS, "", f"must be PATH=VALUE, got {quote(setting)}; such as loop.delay_samples=1")
-        return path.strip(), _parsed(text.strip(), path.strip())
+        return path.strip(), _toml_value(text.strip(), path.strip())
     path, value = setting
-    return path, _parsed(value, path) if isinstance(value, str) else value
+    return path, _toml_value(value, path) if isinstance(value, str) else value
 
 
 def rivals(steps: KeyPath) -> list[str]:
@@ -211,13 +211,15 @@ def resolve(document: dict[str, Any], path: str) -> KeyPath:
     steps: list[str | int] = []
     value: Any = document
     for depth, part in enumerate(parts):
-        index = _element(value, part) if isinstance(value, list) else None
-        if isinstance(value, dict) and (part in value or part in schema.keys(tuple(steps)) or _free(steps)):
+        index = _element_index(value, part) if isinstance(value, list) else None
+        if isinstance(value, dict) and (
+            part in value or part in schema.keys(tuple(steps)) or _takes_any_key(steps)
+        ):
             step: str | int = part
         elif index is not None:
             step = index
         else:
-            raise _unknown(document, path, steps, parts, depth, value)
+            raise _unknown_path_error(document, path, steps, parts, depth, value)
         steps.append(step)
         value = _value(value, (step,))
         if value is UNSET:
@@ -237,15 +239,18 @@ def _split(document: dict[str, Any], path: str) -> list[str]:
     return parts
 
 
-def _unknown(
+def _unknown_path_error(
     document: dict[str, Any], path: str, steps: list[str | int], parts: list[str], depth: int, place: Any
 ) -> DeviceError:
-    """The error for a path whose step number `depth` of `parts` is no key of `place`, which `steps` led to; with a
-    hint of the nearest key."""
+    """The error for a path that leads nowhere, with a hint of the nearest key.
+
+    steps   keys and indices that the first steps of the path stand for;   place  what they lead to
+    parts   the steps of the path, of which number `depth` is no key of `place`
+    """
     first, *rest = path.split(".")
     if steps in ([], ["mechanism"]) and parts[depth:] == [first, *rest]:
-        return fail(SETTINGS, path, f"is not a key of a device file; {_from_the_top(document, first, rest)}")
-    here, choices = dotted(tuple(steps), document), _choices(place, tuple(steps))
+        return fail(SETTINGS, path, f"is not a key of a device file; {_hint_from_the_top(document, first, rest)}")
+    here, choices = dotted(tuple(steps), document), _keys_or_elements(place, tuple(steps))
     near = nearest(parts[depth], choices)
     if near:
         right = ".".join([here, near, *parts[depth + 1 :]])
@@ -255,8 +260,9 @@ def _unknown(
     )
 
 
-def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
-    """A hint for a path whose first step is nowhere: a root key, one of [mechanism], or one further in."""
+def _hint_from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
+    """A hint for a path whose first step is nowhere, with those behind it, `rest`: the nearest key of the file, of
+    [mechanism], or of another section."""
     inside = schema.keys(("mechanism",)) if "mechanism" in document else set()
     near = nearest(first, schema.keys(()) | inside)
     if near:
@@ -269,22 +275,22 @@ def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
     return f"a device file has: {comma_list(sorted(schema.keys(())))}"
 
 
-def _choices(place: Any, steps: KeyPath) -> list[str]:
+def _keys_or_elements(place: Any, steps: KeyPath) -> list[str]:
     """The keys that a table, `place`, has or may have, sorted; of a list the names or numbers of its elements."""
     if isinstance(place, list):
-        names = [e.get("name") if isinstance(e, dict) else None for e in place]
-        return [n if isinstance(n, str) else str(i) for i, n in enumerate(names)]
+        names = [element.get("name") if isinstance(element, dict) else None for element in place]
+        return [name if isinstance(name, str) else str(index) for index, name in enumerate(names)]
     return sorted({*schema.keys(steps), *(place if isinstance(place, dict) else ())})
 
 
-def _free(steps: list[str | int]) -> bool:
+def _takes_any_key(steps: list[str | int]) -> bool:
     """Whether the table at a path takes keys of any name, as [mechanism.assemblies] does."""
     return any(
         isinstance(subschema.get("additionalProperties"), dict) for subschema in schema.subschemas(tuple(steps))
     )
 
 
-def _element(elements: list[Any], part: str) -> int | None:
+def _element_index(elements: list[Any], part: str) -> int | None:
     """Index of the list's element of that name or else of that number, None if there is none."""
     for index, element in enumerate(elements):
         if isinstance(element, dict) and element.get("name") == part:
@@ -309,11 +315,11 @@ def _children(place: Any, part: str) -> list[Any]:
         return list(place.values()) if isinstance(place, dict) else list(place) if isinstance(place, list) else []
     if isinstance(place, dict):
         return [place[part]] if part in place else []
-    index = _element(place, part) if isinstance(place, list) else None
+    index = _element_index(place, part) if isinstance(place, list) else None
     return [] if index is None else [place[index]]
 
 
-def _parsed(text: str, path: str) -> Any:
+def _toml_value(text: str, path: str) -> Any:
     """The text as a TOML value, `UNSET` for the bare word unset, the text itself if it is no TOML."""
     if text == "unset":
         return UNSET
@@ -363,7 +369,11 @@ def edited_text(
 
 
 def _carry_over(place: Any, before: Any, after: Any) -> None:
-    """Change in a parsed TOML file, `place`, the values that differ between plain copies before and after."""
+    """Change in a parsed TOML file, or a table or list of it, what differs between plain copies of it before and
+    after a change; what does not keeps its comments.
+
+    place  the parsed one, changed in place;   before, after  the copies: tables both, or lists of one length
+    """
     if isinstance(after, dict):
         for key in [key for key in before if key not in after]:
             del place[key]
@@ -371,21 +381,22 @@ def _carry_over(place: Any, before: Any, after: Any) -> None:
             if key not in before:
                 place[key] = value
             elif value != before[key]:
-                if isinstance(value, dict | list) and _alike(value, before[key]):
+                if isinstance(value, dict | list) and _same_shape(value, before[key]):
                     _carry_over(place[key], before[key], value)
                 else:
                     place[key] = value
         return
     for index, value in enumerate(after):
         if value != before[index]:
-            if isinstance(value, dict | list) and _alike(value, before[index]):
+            if isinstance(value, dict | list) and _same_shape(value, before[index]):
                 _carry_over(place[index], before[index], value)
             else:
                 place[index] = value
 
 
-def _alike(value: Any, other: Any) -> bool:
-    """Whether two values are tables both, or lists of one length."""
+def _same_shape(value: Any, other: Any) -> bool:
+    """Whether two values are tables both, or lists of one length, so that their inner values can be compared one
+    by one."""
     if isinstance(value, dict):
         return isinstance(other, dict)
     return isinstance(other, list) and len(value) == len(other)
@@ -400,7 +411,9 @@ def table(document: dict[str, Any], key: str) -> dict[str, Any]:
 def tables(document: dict[str, Any], key: str) -> list[tuple[int, dict[str, Any]]]:
     """The tables in the list under a key, each with its index."""
     value = document.get(key)
-    return [(i, v) for i, v in enumerate(value if isinstance(value, list) else []) if isinstance(v, dict)]
+    return [
+        (i, entry) for i, entry in enumerate(value if isinstance(value, list) else []) if isinstance(entry, dict)
+    ]
 
 
 def is_number(value: Any) -> TypeGuard[float]:
@@ -445,7 +458,8 @@ class LegMember:
     own: frozenset[str] = frozenset()
 
     def turn_of(self, name: str) -> Floats:
-        """Rotation (3, 3) of what the copy gives in a link's frame; none for a link of the copy itself."""
+        """Rotation (3, 3) of what the copy gives in the frame of a link of this name; the unit matrix for its own
+        links."""
         if not self.angle or name in self.own:
             return np.eye(3)
         from zwidth.model.rotations import rotation_matrix  # names are compared without it, in no time
@@ -461,16 +475,16 @@ def members(mechanism: Any, group: str) -> list[LegMember]:
     mechanism  a file's table (what is faulty is left out), or its checked section
     group      "links", "loops" or "drives"
     """
-    found = [LegMember(entry, (group, i)) for i, entry in _entries(mechanism, group)]
-    for n, leg in _entries(mechanism, "legs"):
-        given = (_get(link, "name") for _, link in _entries(leg, "links"))
+    found = [LegMember(entry, (group, i)) for i, entry in _members_written(mechanism, group)]
+    for number, leg in _members_written(mechanism, "legs"):
+        given = (_field(link, "name") for _, link in _members_written(leg, "links"))
         names = frozenset(name for name in given if isinstance(name, str))
-        for copy, angle in enumerate(_angles(leg), start=1):
-            own = frozenset(copied(name, copy) for name in names)
-            for i, entry in _entries(leg, group):
-                renamed = _renamed(entry, group, names, copy)
-                axis = _get(leg, "axis") or (0.0, 0.0, 1.0)
-                found.append(LegMember(renamed, ("legs", n, group, i), angle, axis, own))
+        for copy, angle in enumerate(_copy_angles(leg), start=1):
+            own_names = frozenset(copied(name, copy) for name in names)
+            for i, entry in _members_written(leg, group):
+                renamed = _as_copy(entry, group, names, copy)
+                axis = _field(leg, "axis") or (0.0, 0.0, 1.0)
+                found.append(LegMember(renamed, ("legs", number, group, i), angle, axis, own_names))
     return found
 
 
@@ -478,9 +492,9 @@ def written(mechanism: dict[str, Any], group: str) -> Iterator[tuple[KeyPath, di
     """Path under [mechanism] and table of each link, loop or drive of a file, those of a leg once."""
     for i, entry in tables(mechanism, group):
         yield (group, i), entry
-    for n, leg in tables(mechanism, "legs"):
+    for number, leg in tables(mechanism, "legs"):
         for i, entry in tables(leg, group):
-            yield ("legs", n, group, i), entry
+            yield ("legs", number, group, i), entry
 
 
 def copied(name: str, copy: int) -> str:
@@ -492,20 +506,23 @@ def of_copies(mechanism: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     """Values by link name, with those given for a leg's link under the names of all its copies too; what is given
     for one copy comes before what is given for all."""
     spread = dict(values)
-    for _, leg in _entries(mechanism, "legs"):
-        for _, link in _entries(leg, "links"):
-            name = _get(link, "name")
+    for _, leg in _members_written(mechanism, "legs"):
+        for _, link in _members_written(leg, "links"):
+            name = _field(link, "name")
             if not isinstance(name, str) or name not in values:
                 continue
             spread.pop(name, None)
-            for copy in range(1, len(_angles(leg)) + 1):
+            for copy in range(1, len(_copy_angles(leg)) + 1):
                 spread.setdefault(copied(name, copy), values[name])
     return spread
 
 
 def spread_tables(mechanism: dict[str, Any]) -> tuple[dict[str, Any], dict[str, list[KeyPath]]]:
-    """A file's [mechanism] without legs: all copies written out; and where each link, loop and drive is
-    written."""
+    """A file's [mechanism] with all copies of its legs written out.
+
+    Returns the table without legs; and "links", "loops", "drives" -> the path under [mechanism] where each entry
+    of the list is written
+    """
     flat, paths = {key: value for key, value in mechanism.items() if key != "legs"}, {}
     for group in GROUPS:
         all_members = members(mechanism, group)
@@ -523,15 +540,16 @@ def spread_tables(mechanism: dict[str, Any]) -> tuple[dict[str, Any], dict[str, 
 
 
 def written_path(path: KeyPath, paths: Mapping[str, Sequence[KeyPath]]) -> KeyPath:
-    """Path in the file of what is at a path of the mechanism whose legs are written out as copies."""
+    """Path in the file of what is at a path of the mechanism whose legs are written out as copies; `paths` as
+    `spread_tables` returns them."""
     if len(path) > 2 and path[0] == "mechanism" and path[1] in GROUPS and isinstance(path[2], int):
         return ("mechanism", *paths[str(path[1])][path[2]], *path[3:])
     return path
 
 
-def _angles(leg: Any) -> list[float]:
+def _copy_angles(leg: Any) -> list[float]:
     """Angle by which each copy of a leg is turned [rad]; a faulty leg counts as one copy."""
-    angles, count = _get(leg, "angles_rad"), _get(leg, "count")
+    angles, count = _field(leg, "angles_rad"), _field(leg, "count")
     if isinstance(angles, list | tuple) and all(map(is_number, angles)):
         return list(angles)
     if isinstance(count, int) and 0 < count < 100:
@@ -539,36 +557,42 @@ def _angles(leg: Any) -> list[float]:
     return [0.0]
 
 
-def _renamed(entry: Any, group: str, names: frozenset[str], copy: int) -> Any:
-    """A link, loop or drive of a leg as one of its copies has it."""
+def _as_copy(entry: Any, group: str, names: frozenset[str], copy: int) -> Any:
+    """A link, loop or drive of a leg as one of its copies has it, with the copy's names.
 
-    def own(name: Any) -> Any:
+    names  that the leg gives its links;   copy  number of the copy, from 1
+    """
+
+    def name_in_copy(name: Any) -> Any:
+        """A link's name as the copy has it; names that are not the leg's own stay."""
         return copied(name, copy) if isinstance(name, str) and name in names else name
 
     changes: dict[str, Any] = {}
-    if isinstance(_get(entry, "name"), str):
-        changes["name"] = copied(_get(entry, "name"), copy)
-    if group == "links" and _get(entry, "parent") is not None:
-        changes["parent"] = own(_get(entry, "parent"))
-    elif group == "loops" and isinstance(_get(entry, "links"), list | tuple):
-        changes["links"] = type(_get(entry, "links"))(own(name) for name in _get(entry, "links"))
-    elif group == "drives" and _get(entry, "joint") is not None:
-        changes["joint"] = own(_get(entry, "joint"))
-        if _get(entry, "motor_link") is not None:
-            changes["motor_link"] = own(_get(entry, "motor_link"))
-        if isinstance(_get(entry, "coupling"), dict):
-            changes["coupling"] = {own(name): ratio for name, ratio in _get(entry, "coupling").items()}
+    if isinstance(_field(entry, "name"), str):
+        changes["name"] = copied(_field(entry, "name"), copy)
+    if group == "links" and _field(entry, "parent") is not None:
+        changes["parent"] = name_in_copy(_field(entry, "parent"))
+    elif group == "loops" and isinstance(_field(entry, "links"), list | tuple):
+        changes["links"] = type(_field(entry, "links"))(name_in_copy(name) for name in _field(entry, "links"))
+    elif group == "drives" and _field(entry, "joint") is not None:
+        changes["joint"] = name_in_copy(_field(entry, "joint"))
+        if _field(entry, "motor_link") is not None:
+            changes["motor_link"] = name_in_copy(_field(entry, "motor_link"))
+        if isinstance(_field(entry, "coupling"), dict):
+            changes["coupling"] = {name_in_copy(name): ratio for name, ratio in _field(entry, "coupling").items()}
     if isinstance(entry, Section):
         return entry.model_copy(update=changes)
     return {**entry, **changes}
 
 
-def _entries(owner: Any, group: str) -> Iterator[tuple[int, Any]]:
-    """Index and entry of each link, loop or drive of a mechanism or leg, as checked or as a table of a file."""
+def _members_written(owner: Any, group: str) -> Iterator[tuple[int, Any]]:
+    """Index and entry of each link, loop, drive or leg of a mechanism or leg, as checked or as a table of a
+    file."""
     if isinstance(owner, Section):
         return enumerate(getattr(owner, group))
     return iter(tables(owner, group))
 
 
-def _get(entry: Any, key: str) -> Any:
+def _field(entry: Any, key: str) -> Any:
+    """The value of a checked section, or of a table of a file, None where this has none."""
     return getattr(entry, key) if isinstance(entry, Section) else entry.get(key)

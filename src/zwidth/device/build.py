@@ -69,7 +69,7 @@ def controller(loop: LoopSection) -> Controller:
         sampling_period=period,
         delay=delay,
         velocity_filter=_low_pass(loop.velocity.filter),
-        velocity=_velocity(loop, loop.velocity),
+        velocity=_velocity_method(loop, loop.velocity),
         force_filter=_low_pass(loop.force.filter),
         actuator_time_constant=loop.actuator.time_constant_s,
         force_limit=math.inf if loop.saturation is None else loop.saturation.force_N,
@@ -80,6 +80,7 @@ def controller(loop: LoopSection) -> Controller:
 
 
 def _force_sensor(section: ForceSensorSection) -> ForceSensor:
+    """The force sensor of [loop.force_sensor]."""
     low_pass = _low_pass(section.filter)
     return ForceSensor(section.gain, low_pass, section.delay_samples, section.mass_beyond_kg, section.law)
 
@@ -92,7 +93,7 @@ def _feedforward(loop: LoopSection, section: FeedforwardSection) -> Feedforward:
         damping=section.damping_Ns_per_m,
         coulomb=section.coulomb_N,
         dead_band=value_or(section.deadband_m_per_s, 0.0),
-        velocity=_linear_velocity(loop, section.velocity),
+        velocity=_linear_velocity_method(loop, section.velocity),
         velocity_filter=None if section.velocity is None else _low_pass(section.velocity.filter),
         acceleration_filter=_low_pass(section.acceleration_filter),
     )
@@ -104,15 +105,16 @@ def _local_loop(loop: LoopSection, section: LocalSection) -> LocalLoop:
         rate_multiple=section.rate_multiple,
         stiffness=section.stiffness_N_per_m,
         damping=section.damping_Ns_per_m,
-        velocity=_linear_velocity(loop, section.velocity),
+        velocity=_linear_velocity_method(loop, section.velocity),
         velocity_filter=None if section.velocity is None else _low_pass(section.velocity.filter),
         delay=section.delay_samples,
     )
 
 
-def _linear_velocity(loop: LoopSection, section: VelocitySection | None) -> LinearMethod:
-    """The estimate of a feedback beside the wall law, which the file's checks have found linear."""
-    method = BackwardDifference() if section is None else _velocity(loop, section)
+def _linear_velocity_method(loop: LoopSection, section: VelocitySection | None) -> LinearMethod:
+    """The velocity estimate of a feedback beside the wall law, which the file's checks have found linear; the
+    backward difference where its section is left out."""
+    method = BackwardDifference() if section is None else _velocity_method(loop, section)
     assert isinstance(method, LinearMethod)
     return method
 
@@ -124,36 +126,42 @@ def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder 
     return None if given is None else Butterworth(given.order, given.cutoff_Hz, given.discretisation)
 
 
-def _velocity(loop: LoopSection, section: VelocitySection) -> VelocityMethod:
+def _velocity_method(loop: LoopSection, section: VelocitySection) -> VelocityMethod:
     """The velocity estimate of a table; a method whose noise is left out takes that of the encoder's step."""
-    own = section.parameters()
+    parameters = section.parameters()
     step = loop.encoder.resolution_m
     if isinstance(section, KalmanSection) and section.position_noise_m is None and step:
         return Kalman.of_encoder(section.acceleration_noise_m_per_s2, step)
     if isinstance(section, FoawSection) and section.position_noise_m is None and step:
         return Foaw.of_encoder(section.samples, step, section.fit)
-    return METHODS[section.method](**own)
+    return METHODS[section.method](**parameters)
 
 
 def plant(
     section: PlantSection, friction: FrictionSection | None = None, encoder: EncoderSection | None = None
 ) -> Plant:
-    """The plant; matrices are made symmetric to the last bit, and one coordinate is driven, read and held."""
+    """The plant of [plant]; matrices are made symmetric to the last bit. A plant of one coordinate is driven, read
+    and held by it where the file does not say.
+
+    friction, encoder  sections of the nonlinear parts; None: there are none
+    """
     M = stack_numbers(section.mass_kg)
-    n = M.shape[-1]
-    one = (1.0,) if n == 1 else None
-    handle = section.handle or one
-    actuator = stack_numbers(section.actuator or one)
+    size = M.shape[-1]
+    for_one_coordinate = (1.0,) if size == 1 else None
+    handle = section.handle or for_one_coordinate
+    actuator = stack_numbers(section.actuator or for_one_coordinate)
     bare = Plant(
-        mass=_even(M),
-        damping=_even(stack_numbers(section.damping_Ns_per_m) if section.damping_Ns_per_m else np.zeros((n, n))),
-        stiffness=_even(
-            stack_numbers(section.stiffness_N_per_m) if section.stiffness_N_per_m else np.zeros((n, n))
+        mass=_symmetric(M),
+        damping=_symmetric(
+            stack_numbers(section.damping_Ns_per_m) if section.damping_Ns_per_m else np.zeros((size, size))
+        ),
+        stiffness=_symmetric(
+            stack_numbers(section.stiffness_N_per_m) if section.stiffness_N_per_m else np.zeros((size, size))
         ),
         actuator=actuator,
-        sensor=stack_numbers(section.sensor or one),
+        sensor=stack_numbers(section.sensor or for_one_coordinate),
         handle=None if handle is None else stack_numbers(handle),
-        names=tuple(f"coordinate {i}" for i in range(n)),
+        names=tuple(f"coordinate {i}" for i in range(size)),
     )
     bare = replace(bare, nonlinear=nonlinear_of_plant(bare, section, friction, encoder))
     if section.loss_factor:
@@ -209,6 +217,7 @@ def in_space(vector: Sequence[Any]) -> list[Any]:
 def roll_pitch_yaw(angles: ArrayLike) -> Floats:
     """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
     turns = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
+    # cosine and sine of roll, pitch and yaw, each (...)
     (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
     rows = np.array(
         [
@@ -220,7 +229,8 @@ def roll_pitch_yaw(angles: ArrayLike) -> Floats:
     return np.ascontiguousarray(np.moveaxis(rows, (0, 1), (-2, -1)))
 
 
-def _even(matrix: Floats) -> Floats:
+def _symmetric(matrix: Floats) -> Floats:
+    """Matrices (..., n, n) made symmetric to the last bit."""
     return 0.5 * matrix + 0.5 * np.swapaxes(matrix, -1, -2)
 
 
@@ -262,11 +272,13 @@ def nonlinear_kind(path: KeyPath) -> str:
 def nonlinear_of_plant(
     plant: Plant, section: PlantSection, friction: FrictionSection | None, encoder: EncoderSection | None
 ) -> Nonlinear:
-    """What a linear plant leaves out: dry friction, encoder step and noise, nonlinear springs, brakes."""
-    one = np.ones(1) if plant.size == 1 else plant.actuator
+    """What a linear plant leaves out: dry friction, encoder step and noise, nonlinear springs, brakes; of springs
+    and brakes those that are not 0."""
+    as_actuator = np.ones(1) if plant.size == 1 else plant.actuator
 
     def along(given: Sequence[float] | None) -> Floats:
-        return one if given is None else np.array(given, dtype=np.float64)
+        """The vector (n,) that a table gives, or else the actuator's."""
+        return as_actuator if given is None else np.array(given, dtype=np.float64)
 
     springs = [
         Spring(along(spring.along), spring.hardening_N_per_m3, spring.backward_excess_N_per_m)
@@ -276,14 +288,14 @@ def nonlinear_of_plant(
         Brake(along(brake.along), brake.damping_max_Ns_per_m, brake.time_constant_s) for brake in section.brake
     ]
     return Nonlinear(
-        friction=() if friction is None else _friction(friction),
+        friction=() if friction is None else _plant_friction(friction),
         counters=() if encoder is None else _counters(plant.sensor, encoder),
         springs=tuple(spring for spring in springs if spring.cubic or spring.backward_excess),
         brakes=tuple(brake for brake in brakes if brake.damping),
     )
 
 
-def _friction(section: FrictionSection) -> tuple[Friction, ...]:
+def _plant_friction(section: FrictionSection) -> tuple[Friction, ...]:
     """The dry friction of a given plant: one element for each coordinate that has any."""
     levels = section.coulomb_N
     breakaway = (math.nan,) * len(levels) if section.breakaway_N is None else section.breakaway_N
@@ -303,6 +315,8 @@ def _friction(section: FrictionSection) -> tuple[Friction, ...]:
 
 
 def _counters(sensor: Floats, encoder: EncoderSection) -> tuple[Counter, ...]:
+    """The encoder of a given plant that reads `sensor` (n,), as the only element; () where it has neither step nor
+    noise."""
     step, noise = encoder.resolution_m or 0.0, encoder.noise_m or 0.0
     return (Counter(sensor.copy(), step, noise=noise),) if step or noise else ()
 
@@ -321,7 +335,8 @@ NONLINEAR_NUMBERS: Final = {
 
 
 def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSection) -> DriveNonlinearity | None:
-    """Friction and encoder steps of a mechanism's drives (d,), at the motor; None where the file gives neither."""
+    """What a linear answer leaves out of a mechanism's d drives, at the motor: friction, springs that are not
+    straight, brakes, encoder noise; None where the file gives none of it."""
     nonlinearity = DriveNonlinearity(
         friction_model=friction.model,
         bristle_stiffness=value_or(friction.bristle_stiffness_Nm_per_rad, math.inf),
@@ -347,6 +362,7 @@ def drive_columns(
 
 
 def value_or(value: float | None, omitted: float) -> float:
+    """A number, or `omitted` where it is None."""
     return omitted if value is None else value
 
 
@@ -373,9 +389,10 @@ def vectors(label: str, name: str, value: Any) -> Floats:
 
 
 def positions(label: str, value: Any, height: float) -> Floats:
-    """Positions (..., 3) [m]; those of two numbers lie at a height. Raises DeviceError as `vectors`."""
+    """Positions (..., 3) [m]; those of two numbers get the third coordinate `height` [m]. Raises DeviceError as
+    `vectors`."""
     given = vectors(label, "at", value)
-    return given if given.shape[-1] == 3 else _completed(given, height)
+    return given if given.shape[-1] == 3 else _with_third(given, height)
 
 
 def unit_vectors(label: str, name: str, value: Any) -> Floats:
@@ -384,7 +401,7 @@ def unit_vectors(label: str, name: str, value: Any) -> Floats:
     Raises  DeviceError  as `vectors`, and for a vector of no length
     """
     given = vectors(label, name, value)
-    given = given if given.shape[-1] == 3 else _completed(given, 0.0)
+    given = given if given.shape[-1] == 3 else _with_third(given, 0.0)
     largest = np.abs(given).max(axis=-1, keepdims=True, initial=0.0)
     if not largest.all():
         raise fail(label, name, "has zero length; give any vector along it, such as 0,1")
@@ -404,13 +421,13 @@ def screws(label: str, direction: Any, axis: Any, length: Any) -> Floats:
                positive
     """
     w = vectors(label, "axis", axis)
-    w = w if w.shape[-1] == 3 else _completed(w, 0.0)
+    w = w if w.shape[-1] == 3 else _with_third(w, 0.0)
     if direction is None:
         if length is not None:
             raise fail(label, "characteristic_length", "is of a direction and an axis together; leave it out")
         return np.concatenate([np.zeros_like(w), unit_vectors(label, "axis", w)], axis=-1)
     u = vectors(label, "direction", direction)
-    u = u if u.shape[-1] == 3 else _completed(u, 0.0)
+    u = u if u.shape[-1] == 3 else _with_third(u, 0.0)
     unit_vectors(label, "axis", w), unit_vectors(label, "direction", u)  # which refuse vectors without length
     L = float(length) if isinstance(length, Real) else nan
     if not 0.0 < L < inf:
@@ -441,8 +458,9 @@ def rotations(label: str, orientation: Any) -> Floats:
 
 
 def joint_angles(label: str, mechanism: Mechanism, at: Mapping[str, float]) -> dict[str, float]:
-    """Angles of all driven joints by the names of their links [rad].
+    """Angles of all driven joints by the names of their links [rad], checked.
 
+    at  name -> angle, as the user gives them
     Raises  DeviceError  for other joints than the driven ones, and for a value that is not an angle
     """
     driven = [mechanism.links.names[joint] for joint in mechanism.drives.joint]
@@ -459,5 +477,6 @@ def joint_angles(label: str, mechanism: Mechanism, at: Mapping[str, float]) -> d
     return angles
 
 
-def _completed(given: Floats, third: float) -> Floats:
+def _with_third(given: Floats, third: float) -> Floats:
+    """Vectors (..., 2) with a third number, alike for all of them."""
     return np.concatenate([given, np.full((*given.shape[:-1], 1), third)], axis=-1)

@@ -87,7 +87,8 @@ ARRAYS: Final[tuple[KeyPath, ...]] = (
 def takes_arrays(steps: KeyPath) -> bool:
     """Whether the number, or the list of numbers, at a resolved path may be an array over designs."""
     return any(
-        len(steps) >= len(pattern) and all(p in ("*", s) for p, s in zip(pattern, steps, strict=False))
+        len(steps) >= len(pattern)
+        and all(pattern_step in ("*", step) for pattern_step, step in zip(pattern, steps, strict=False))
         for pattern in ARRAYS
     )
 
@@ -138,6 +139,7 @@ class DesignBatch:
         Raises     what `Device.at` raises, of what is the same for all designs
         """
         parts, none = self.parts, np.zeros(self.count, dtype=bool)
+        # axes of the positions: none, that of the designs, or those of a workspace
         axes = 0 if position is None else np.ndim(position) - 1
         if self.device.mechanism is None or not (design_shape(parts.mechanism) or axes == 1):
             point = self.device.at(position, direction, assembly=assembly, model=model)
@@ -172,20 +174,21 @@ class DesignBatch:
     def _over_workspace(
         self, position: Floats, direction: Any, assembly: str | None, model: str | None
     ) -> tuple[OperatingPoint, Flags]:
-        """The operating points of all designs over positions, each design following its own roadmap of postures;
-        and marks (P,) of the designs that are to be computed alone."""
+        """The operating points of all designs over positions, the postures of each design found by themselves; and
+        marks (P,) of the designs that are to be computed alone."""
         mechanism, alone = cast(Mechanism, self.parts.mechanism), np.zeros(self.count, dtype=bool)
         postures: list[Posture | None] = []
-        for p in range(self.count):
-            own = change_designs(mechanism, at_index(p), (self.count,))
+        for design in range(self.count):
+            one_design = change_designs(mechanism, at_index(design), (self.count,))
             try:
                 with self.device.solving(assembly) as name:
-                    postures.append(solve_posture(own, self.device.position(position), name))
+                    postures.append(solve_posture(one_design, self.device.position(position), name))
             except (PostureError, DeviceError):
                 postures.append(None)
-                alone[p] = True
+                alone[design] = True
                 continue
-            alone[p] = not masses_moved(cast(Posture, postures[p])).all()
+            alone[design] = not masses_moved(cast(Posture, postures[design])).all()
+        # a design that is to be computed alone gets another's postures here, which nobody reads
         solved = next((one for one in postures if one is not None), None)
         if solved is None:
             return self.device.at(model=model), alone
@@ -213,15 +216,19 @@ class DesignBatch:
         return self._with_parts(point, len(shape) - 1)
 
     def _with_parts(self, point: OperatingPoint, axes: int) -> OperatingPoint:
-        """A point with the numbers of all designs on a first axis, before its `axes` axes of a workspace."""
+        """A point with the numbers of all designs on a first axis.
+
+        axes  how many axes of a workspace stand behind that of the designs
+        """
 
         def beside(array: NDArray[Any]) -> NDArray[Any]:
+            """Numbers (P, ...) with axes of length 1 in place of those of the workspace."""
             return array.reshape(self.count, *(1,) * axes, *array.shape[1:])
 
         parts = change_fields(self.parts, _PARTS, beside, (self.count,))
         posture, directions = point.posture, point.directions
         if posture is None or directions is None or posture.status.ndim > axes:
-            return replace(point, **parts)
+            return replace(point, **parts)  # a posture, if there is one, has the axis of the designs already
         if not any(design_shape(part) for part in parts.values()):
             return point
         shape = (self.count, *point.shape)
@@ -241,28 +248,29 @@ def design_batch(
     checked, cleaned = check(document, label)
     leaves = dict(leaf for steps, numbers in columns.items() for leaf in _leaves(steps, numbers))
     valid = certainly_valid(document, leaves, count)
-    if _built_alone(document):
+    if _must_be_built_alone(document):
         valid = np.zeros(count, dtype=np.bool_)
     with_arrays: Any = checked
     for steps, numbers in columns.items():
         # what is not valid stays out of the arithmetic, too
-        first = int(np.argmax(valid))
-        used = np.where(valid.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, numbers[first])
-        with_arrays = _substitute(with_arrays, document, steps, used)
+        first_valid = int(np.argmax(valid))
+        used = np.where(valid.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, numbers[first_valid])
+        with_arrays = _with_numbers(with_arrays, document, steps, used)
     device = build_device(checked, cleaned, label)
     surplus = device.mechanism.drives.surplus if device.mechanism is not None else ()
     parts = build_device(with_arrays, cleaned, label, surplus) if valid.any() else device
     return DesignBatch(device, parts, count), valid
 
 
-def _built_alone(document: dict[str, Any]) -> bool:
-    """Whether each design has a balance, an arm or beams of its own, which are computed one by one."""
+def _must_be_built_alone(document: dict[str, Any]) -> bool:
+    """Whether each design of a document has a balance, an arm or beams of its own, which are computed one by
+    one."""
     bends = any("beam" in member.entry for member in members(table(document, "mechanism"), "links"))
     return bends or bool({"load", "arm"} & document.keys())
 
 
 def _leaves(steps: KeyPath, numbers: Floats) -> Iterator[tuple[KeyPath, Floats]]:
-    """Path and numbers (P,) of each single number of designs, of an array (P, ...) one for each element."""
+    """Path and numbers (P,) of each single number in an array (P, ...) of designs that stands at a path."""
     if numbers.ndim == 1:
         yield steps, numbers
         return
@@ -270,31 +278,38 @@ def _leaves(steps: KeyPath, numbers: Floats) -> Iterator[tuple[KeyPath, Floats]]
         yield from _leaves((*steps, i), numbers[:, i])
 
 
-def _substitute(value: Any, raw: Any, steps: KeyPath, numbers: Floats) -> Any:
-    """A checked value with arrays in place of the numbers at a path; `raw` is what the document holds there."""
+def _with_numbers(value: Any, raw: Any, steps: KeyPath, numbers: Floats) -> Any:
+    """A copy of a checked value with arrays over designs in place of the numbers at a path below it.
+
+    value    a section, table, tuple or number as it was checked
+    raw      what the document holds there: of a matrix that is written as one number or three moments `value` is
+             the whole matrix, and `raw` tells what the numbers stand for
+    steps    path below the value;   numbers  (P, ...)
+    """
     if isinstance(value, Section):
         key = cast(str, steps[0])
-        inner = _substitute(getattr(value, key), raw[key], steps[1:], numbers)
+        inner = _with_numbers(getattr(value, key), raw[key], steps[1:], numbers)
         return value.model_copy(update={key: inner})
     if isinstance(value, dict):
-        return {**value, steps[0]: _substitute(value[steps[0]], raw[steps[0]], steps[1:], numbers)}
+        return {**value, steps[0]: _with_numbers(value[steps[0]], raw[steps[0]], steps[1:], numbers)}
     if steps:
         i = cast(int, steps[0])
-        place = (i, i) if isinstance(value[0], tuple) and not isinstance(raw[0], list) else (i,)  # three moments
+        # one of three moments stands on the diagonal of a matrix
+        place = (i, i) if isinstance(value[0], tuple) and not isinstance(raw[0], list) else (i,)
         if len(place) == 2:
             return tuple(
                 tuple(numbers if (r, c) == place else cell for c, cell in enumerate(row))
                 for r, row in enumerate(value)
             )
-        inner = _substitute(value[i], raw[i], steps[1:], numbers)
+        inner = _with_numbers(value[i], raw[i], steps[1:], numbers)
         return (*value[:i], inner, *value[i + 1 :])
     if isinstance(value, tuple) and not isinstance(raw, list):  # one number that stands for a matrix or a vector
         return ((numbers,),) if isinstance(value[0], tuple) else (numbers,)
     if isinstance(value, tuple) and isinstance(value[0], tuple) and numbers.ndim == 2:  # three moments
         return tuple(tuple(numbers[:, r] if r == c else 0.0 for c in range(3)) for r in range(3))
-    return _columns(numbers)
+    return _nested_arrays(numbers)
 
 
-def _columns(numbers: Floats) -> Any:
+def _nested_arrays(numbers: Floats) -> Any:
     """Numbers (P, ...) as nested tuples of arrays (P,)."""
-    return numbers if numbers.ndim == 1 else tuple(_columns(numbers[:, i]) for i in range(numbers.shape[1]))
+    return numbers if numbers.ndim == 1 else tuple(_nested_arrays(numbers[:, i]) for i in range(numbers.shape[1]))

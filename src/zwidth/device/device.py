@@ -101,7 +101,7 @@ class Device:
     def friction_known(self) -> bool:
         """Whether the file gives the dry friction, 0 included."""
         mechanism = self.document.get("mechanism", {})
-        return "friction" in self.document or any("coulomb_Nm" in d for d in mechanism.get("drives", ()))
+        return "friction" in self.document or any("coulomb_Nm" in drive for drive in mechanism.get("drives", ()))
 
     @property
     def resolution_known(self) -> bool:
@@ -150,8 +150,7 @@ class Device:
 
         A single position that the handle misses by 1 % of the arm's length or less is projected onto one
         that it has, found by descent; `point.posture.projected` says how far. In a batch a position that cannot
-        be had is marked in
-        `point.status`.
+        be had is marked in `point.status`.
 
         position    (..., 2) or (..., 3) [m]; x, y lies at the height of the file's reference, whose plane a planar
                     device does not leave. Or the angle of every driven joint by the name of its link [rad], or a
@@ -441,6 +440,7 @@ class Device:
         if self.mechanism is None:
             return False
         rendered = self.direction(direction, axis, characteristic_length)
+        # a screw, of which the part along a direction is 0
         return rendered.shape[-1] == 6 and not rendered[..., :3].any()
 
     def _posture_under_load(self, posture: Posture, directions: Floats, model: str | None) -> Posture:
@@ -456,7 +456,11 @@ class Device:
         return loaded_postures(mechanism, posture, screw(directions[..., 0, :]), self.load, counts_motors)
 
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
-        """The requested position that a point keeps, so that another device can be put there."""
+        """The requested position that a point keeps, so that another device can be put there: (..., 3) [m], joint
+        angles by name, or None for the reference.
+
+        position  as for `at`; of a posture, under load, the position of the one that was asked for
+        """
         from zwidth.model.posture import Posture
 
         if position is None or isinstance(position, Mapping):
@@ -472,7 +476,12 @@ class Device:
         relative_stiffness: ArrayLike | None,
         relative_damping: ArrayLike | None,
     ) -> WallMatrices | None:
-        """The matrices of the law along rendered directions (..., m, 3); None where it is the same along each."""
+        """The matrices of the wall law along directions rendered together; None where it is the same along each.
+
+        directions  as the user gave them; None for one direction
+        rendered    (..., m, 3) or (..., m, 6), the unit vectors or screws of all of them; None of a plant
+        Raises  DeviceError  for a relative stiffness or damping without directions
+        """
         from zwidth.loop.wall_matrices import WallMatrices
 
         given = {"relative_stiffness": relative_stiffness, "relative_damping": relative_damping}
@@ -490,7 +499,8 @@ class Device:
         characteristic_length: float | None,
         directions: ArrayLike | None,
     ) -> Floats:
-        """Unit vectors (..., m, 3), or screws (..., m, 6), of the directions rendered together."""
+        """Unit vectors (..., m, 3), or screws (..., m, 6), of the directions rendered together; m = 1 of a single
+        direction. Arguments as for `at`. Raises DeviceError."""
         if directions is None:
             return self.direction(direction, axis, characteristic_length)[..., None, :]
         if axis is not None:
@@ -539,7 +549,9 @@ class Device:
 
     @contextmanager
     def solving(self, assembly: str | None) -> Iterator[str | None]:
-        """The name of the assembly, and what goes wrong in it as faults of the file where it is one."""
+        """The name of an assembly, the reference's where it is None, for a block that finds postures in it; what
+        goes wrong there is raised as DeviceError of the file where that is to blame. Raises DeviceError for a name
+        that is none."""
         mechanism = self._mechanism(assembly=assembly)
         if assembly is not None and assembly not in mechanism.assemblies:
             known = set(mechanism.assemblies)
@@ -560,14 +572,16 @@ class Device:
             raise fail(self.label, "mechanism", str(error)) from None
 
     def _mechanism(self, **given: object) -> Mechanism:
-        """The mechanism, or the reason why these arguments do not apply to a given plant."""
+        """The mechanism. Raises DeviceError where there is none, for the arguments that are given (not None) and
+        do not apply."""
         if self.mechanism is None:
             self._refuse(**given)
             raise fail(self.label, "", f"has a {self._kind} and no [mechanism]; it has no postures or directions")
         return self.mechanism
 
     def _refuse(self, **given: object) -> None:
-        """Raise DeviceError for all arguments that are given and do not apply to a device of this kind."""
+        """Raise DeviceError for all arguments, by name, that are given (not None) and so do not apply to a device
+        of this kind."""
         named = [name for name, value in given.items() if value is not None]
         if named:
             raise DeviceError(
@@ -579,4 +593,5 @@ class Device:
 
     @property
     def _kind(self) -> str:
+        """The table that describes a device without mechanism, as users write it."""
         return "[response]" if self.response is not None else "[plant]"

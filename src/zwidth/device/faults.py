@@ -73,7 +73,7 @@ def quote(value: Any) -> str:
         case dict():
             return "a table"
         case list() | tuple():
-            return f"the list {_shortened('[' + ', '.join(_item(v) for v in value[:20]) + ']')}"
+            return f"the list {_shortened('[' + ', '.join(_item_text(v) for v in value[:20]) + ']')}"
         case _:
             return _shortened(str(value))
 
@@ -103,7 +103,7 @@ def nearest(word: str, allowed: Collection[str]) -> str | None:
 
 
 def suggestion(word: str, allowed: Collection[str], noun: str = "allowed") -> str:
-    """'did you mean "x"?' or else the list of what is allowed."""
+    """'did you mean "x"?' or else the list of what is allowed, which is called `noun`."""
     near = nearest(word, allowed)
     if near is not None:
         return f"did you mean '{near}'?"
@@ -124,14 +124,14 @@ def dotted(path: KeyPath, document: Any = None) -> str:
     """The path as users write it; list elements go by their name where the document gives one."""
     parts = []
     for part in path:
-        inside = _step(document, part)
+        inside = _value_at(document, part)
         name = inside.get("name") if isinstance(part, int) and isinstance(inside, dict) else None
         parts.append(name if isinstance(name, str) and name else str(part))
         document = inside
     return ".".join(parts)
 
 
-def _step(document: Any, part: str | int) -> Any:
+def _value_at(document: Any, part: str | int) -> Any:
     """The value at a key or index of a document; None where there is none."""
     if isinstance(document, dict):
         return document.get(part)
@@ -141,15 +141,17 @@ def _step(document: Any, part: str | int) -> Any:
 
 
 def _plain(word: str) -> str:
+    """A word as it is compared: in small letters, with _ for -."""
     return word.lower().replace("-", "_")
 
 
 def _shortened(text: str) -> str:
+    """A text cut to the longest that messages quote."""
     return text if len(text) <= LONGEST_QUOTE else text[: LONGEST_QUOTE - 3] + "..."
 
 
-def _item(value: Any) -> str:
+def _item_text(value: Any) -> str:
     """A value inside a list as it would stand in the file: lists are cut after 20 elements."""
     if isinstance(value, list):
-        return "[" + ", ".join(_item(v) for v in value[:20]) + "]"
+        return "[" + ", ".join(_item_text(v) for v in value[:20]) + "]"
     return repr(value) if isinstance(value, str) else quote(value)

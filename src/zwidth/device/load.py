@@ -67,14 +67,15 @@ def document_held_by(
         return with_operator(document, table_of_operator(operator))
     if operator == NOBODY:
         return with_operator(document, None)
-    arm = _arm_of(operator)
+    arm = _arm_table_of(operator)
     return (
         with_operator(document, operator_table(operator)) if arm is None else with_operator(document, None) | arm
     )
 
 
-def _arm_of(name_or_path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    """The [arm] of a file that has one, to be checked with the device; None of any other."""
+def _arm_table_of(name_or_path: str | os.PathLike[str]) -> dict[str, Any] | None:
+    """What a file with an [arm] adds to a device's document, {"arm": table}, to be checked with the device; None
+    of any other file."""
     whole, label = read(name_or_path, OPERATORS)
     if not isinstance(whole.get("arm"), dict):
         return None
@@ -142,6 +143,7 @@ def document_under(
     load     a `Load`; the hand's force (2,) or (3,), or about an axis its moment, in place of that of the
              document; None: as the document says
     gravity  (2,) or (3,) in place of the document's; None: as the document says
+    moment   whether numbers are a moment [N m]; else they are a force [N]
     Raises   DeviceError  for what is no load
     """
     if isinstance(load, Load):
@@ -225,7 +227,7 @@ def load(
     """
     if not isinstance(name_or_path, str | os.PathLike):
         raise wrong_type("name_or_path", "a bundled name or a path", name_or_path)
-    changes = _listed(settings)
+    changes = _settings_list(settings)
     document, label = read(name_or_path, pipes=True)
     device = from_document(address.apply(document_held_by(document, operator), changes), label)
     warn_of_implausible(device)
@@ -235,10 +237,10 @@ def load(
 def device_with_settings(device: Device, settings: Settings) -> Device:
     """The device with settings applied, checked again; see `Device.with_`.
 
-    Whether the mechanism can be assembled is checked again only where one of its numbers has changed, and of
-    compiled code first.
+    Whether the mechanism can be assembled is checked again only where one of its numbers has changed; compiled
+    code is asked first.
     """
-    document = address.apply(device.document, _listed(settings))
+    document = address.apply(device.document, _settings_list(settings))
     same = document.get("mechanism") == device.document.get("mechanism")
     made = from_document(document, device.label, skip_assembly_check=same, compiled=True)
     warn_of_implausible(made)
@@ -251,7 +253,8 @@ def device_held_by(device: Device, operator: Operator | str | os.PathLike[str]) 
 
 
 def device_under(device: Device, load: Load | ArrayLike | None, gravity: ArrayLike | None, moment: bool) -> Device:
-    """The device under another load; see `Device.under`. moment: whether numbers are a moment."""
+    """The device under another load; see `Device.under`. moment: whether numbers are a moment [N m]; else a force
+    [N]."""
     document = document_under(device.document, load, gravity, moment, device.label)
     return (
         device if document is device.document else from_document(document, device.label, skip_assembly_check=True)
@@ -276,7 +279,7 @@ def device_of_point(device: Device, point: OperatingPoint) -> Device:
     return device_without_load(device) if point.load is None else device_under(device, point.load, None, False)
 
 
-def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:
+def _settings_list(settings: Settings) -> Sequence[str | tuple[str, Any]]:
     """Settings as a sequence. Raises TypeError for a single text."""
     if isinstance(settings, str):
         raise wrong_type("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
@@ -335,7 +338,8 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
 
 
 def _assembled(device: Device) -> bool:
-    """Whether the loops of a device's mechanism close, in its reference assembly."""
+    """Whether a device's mechanism is known to close at its reference, with a mass for every motion; False may
+    also mean that it closes elsewhere."""
     from zwidth.device.mechanism_check import assembles
 
     assert device.mechanism is not None
@@ -398,8 +402,10 @@ def _arm(section: ArmSection) -> Arm:
 def _mechanism(
     section: MechanismSection, document: dict[str, Any], label: str, surplus: tuple[int, ...] | None
 ) -> Mechanism:
-    """The mechanism of a checked section; its surplus drives are computed where `surplus` is None. Raises
-    DeviceError for a beam that cannot be built."""
+    """The mechanism of a checked section. Raises DeviceError for a beam that cannot be built.
+
+    surplus  its drives beyond the mechanism's freedom; None: to be found
+    """
     from zwidth.device.build_mechanism import mechanism  # compiled code, which a plant does without
     from zwidth.device.mechanism_check import surplus_drives
 
@@ -416,12 +422,15 @@ def _mechanism(
 def in_order(faults: Iterable[tuple[KeyPath, str]], document: dict[str, Any], label: str) -> list[Fault]:
     """The faults in the order of the file's keys; of several about one key, each is kept."""
     order = {path: place for place, path in enumerate(_paths(document))}
-    ranked = sorted(faults, key=lambda item: _rank(item[0], order))
+    ranked = sorted(faults, key=lambda item: _place_in_file(item[0], order))
     return [Fault(label, dotted(path, document), message) for path, message in ranked]
 
 
-def _rank(path: KeyPath, order: dict[KeyPath, int]) -> int:
-    """Place of the path in the file, or of the table it is missing from."""
+def _place_in_file(path: KeyPath, order: dict[KeyPath, int]) -> int:
+    """Place of a path in the file, or of the table that it is missing from; -1 for the whole file.
+
+    order  path -> place, of every key of the file
+    """
     while path and path not in order:
         path = path[:-1]
     return order.get(path, -1)

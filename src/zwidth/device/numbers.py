@@ -104,13 +104,14 @@ def device_numbers(device: Device) -> tuple[DeviceNumber, ...]:
     [('plant.mass_kg', 0.025, 0.4), ('loop.sampling_period_s', 0.00025, 0.004)]
     """
     document = device.document
-    given = list(_values(document, document, ()))
-    absent = list(_absent(document, {steps for steps, _ in given}))
-    last = {steps[:end]: n for n, (steps, _) in enumerate(given) for end in range(len(steps))}
-    placed = [(n, 0, _record(device, steps, value, True)) for n, (steps, value) in enumerate(given)]
+    given = list(_given_values(document, document, ()))
+    absent = list(_absent_values(document, {steps for steps, _ in given}))
+    # path of a table or list -> place in the order of the last number inside it, behind which absent ones come
+    last_inside = {steps[:end]: place for place, (steps, _) in enumerate(given) for end in range(len(steps))}
+    placed = [(place, 0, _record(device, steps, value, True)) for place, (steps, value) in enumerate(given)]
     for steps, value in absent:
-        own = next(steps[:end] for end in reversed(range(len(steps))) if steps[:end] in last)
-        placed.append((last[own], 1, _record(device, steps, value, False)))
+        owner = next(steps[:end] for end in reversed(range(len(steps))) if steps[:end] in last_inside)
+        placed.append((last_inside[owner], 1, _record(device, steps, value, False)))
     return tuple(record for _, _, record in sorted(placed, key=lambda one: one[:2]))
 
 
@@ -126,62 +127,75 @@ def unchangeable(steps: KeyPath) -> str:
     return circumstance(steps) or next((why for head, why in OTHERS.items() if steps[: len(head)] == head), "")
 
 
-def _values(document: dict[str, Any], place: Any, path: KeyPath) -> Iterator[tuple[KeyPath, float | str]]:
-    """Steps and value of each number, and of each text that is one of a list, that the file gives."""
-    if isinstance(place, dict | list):
-        for step, inner in place.items() if isinstance(place, dict) else enumerate(place):
-            yield from _values(document, inner, (*path, step))
-    elif unchangeable(path) or isinstance(place, bool):
+def _given_values(document: dict[str, Any], value: Any, path: KeyPath) -> Iterator[tuple[KeyPath, float | str]]:
+    """Steps and value of each number, and of each text that is one of a list, that stand in a value of the
+    document.
+
+    value, path  the table, list, number or text, and where it stands
+    """
+    if isinstance(value, dict | list):
+        for step, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _given_values(document, inner, (*path, step))
+    elif unchangeable(path) or isinstance(value, bool):
         return
-    elif isinstance(place, int | float) or (isinstance(place, str) and _choices(document, path)):
-        yield path, place
+    elif isinstance(value, int | float) or (isinstance(value, str) and _choices(document, path)):
+        yield path, value
 
 
-def _absent(document: dict[str, Any], given: set[KeyPath]) -> Iterator[tuple[KeyPath, float | str | None]]:
-    """Steps of each key that the file leaves out and that may be set alone, and what leaving it out amounts to."""
+def _absent_values(document: dict[str, Any], given: set[KeyPath]) -> Iterator[tuple[KeyPath, float | str | None]]:
+    """Steps of each key that the file leaves out and that may be set alone, and what leaving it out amounts to.
+
+    given  steps of the numbers and texts that it gives
+    """
     found = set[KeyPath]()
-    tables = ((), *_tables(document, ()))
+    tables = ((), *_table_paths(document, ()))
     for steps in dict.fromkeys(key for table in tables for key in _absent_keys(document, table)):
         rivals = {(*steps[:-1], key) for key in address.rivals(steps)}
         if unchangeable(steps) or rivals & (given | found):
             continue
-        for value in _standing_for_nothing(document, steps):
+        for value in _value_of_nothing(document, steps):
             found.add(steps)
             yield steps, value
 
 
-def _tables(place: Any, path: KeyPath) -> Iterator[KeyPath]:
+def _table_paths(place: Any, path: KeyPath) -> Iterator[KeyPath]:
     """Path of every table in a document, but not that of the whole."""
     if isinstance(place, dict | list):
         for step, inner in place.items() if isinstance(place, dict) else enumerate(place):
             if isinstance(inner, dict):
                 yield (*path, step)
-            yield from _tables(inner, (*path, step))
+            yield from _table_paths(inner, (*path, step))
 
 
 def _absent_keys(document: dict[str, Any], table: KeyPath) -> Iterator[KeyPath]:
-    """Every key of a table that it leaves out, and those inside a table that it leaves out."""
-    place: Any = document
+    """Steps of every key of a table that it leaves out, and of those inside a table that it leaves out.
+
+    table  steps of the table, which may itself be left out
+    """
+    value: Any = document
     for step in table:
-        place = place.get(step) if isinstance(place, dict) else place[step]
-        if place is None:
+        value = value.get(step) if isinstance(value, dict) else value[step]
+        if value is None:
             break
     kinds = schema.subschemas(table, document)
     for key in dict.fromkeys(key for kind in kinds for key in kind.get("properties", {})):
         steps = (*table, key)
-        if isinstance(place, dict) and key in place:
+        if isinstance(value, dict) and key in value:
             continue
         if any("properties" in one for one in schema.subschemas(steps, document)):
             inside = _absent_keys(document, steps)
             # a text changes nothing of a part that is not there
-            there = schema.default(steps, document) is not None
-            yield from (own for own in inside if there or not _choices(document, own))
+            has_default = schema.default(steps, document) is not None
+            yield from (
+                inner_steps for inner_steps in inside if has_default or not _choices(document, inner_steps)
+            )
         else:
             yield steps
 
 
-def _standing_for_nothing(document: dict[str, Any], steps: KeyPath) -> Iterator[float | str | None]:
-    """The value, if there is one, that says the same as leaving a key out, where that key may be set alone."""
+def _value_of_nothing(document: dict[str, Any], steps: KeyPath) -> Iterator[float | str | None]:
+    """Yield the value that says the same as leaving a key out; nothing where no value does, or where the file's
+    checks refuse it if it is set alone."""
     choices, default = _choices(document, steps), schema.default(steps, document)
     tried = [default]
     if choices:
@@ -214,28 +228,34 @@ def _choices(document: dict[str, Any], steps: KeyPath) -> tuple[str, ...]:
     return tuple(found) if len(found) > 1 else ()
 
 
-def _brings(
+def _changes_by_kind(
     document: dict[str, Any], steps: KeyPath, choices: tuple[str, ...]
 ) -> dict[str, dict[str, float | str | None]]:
-    """For each kind of table that a tag may name, what changes with it: keys it needs, with usual values, and None
-    for keys it does not read. A kind that is refused for other reasons is left out."""
+    """For each kind of table that a tag at `steps` may name, what changes with it: path -> usual value of a key
+    that it needs, or None for one that it does not read. {} where the key is no tag; a kind that is refused for
+    other reasons is left out."""
     tag, keys = schema.kinds(steps[:-1])
     if steps[-1] != tag:
         return {}
     table = dotted(steps[:-1], document)
-    own = {key for kind in keys.values() for key in kind if any(key not in other for other in keys.values())}
+    not_shared = {
+        key for kind in keys.values() for key in kind if any(key not in other for other in keys.values())
+    }
     found: dict[str, dict[str, float | str | None]] = {}
     for choice in choices:
-        made = _of_kind(document, steps, choice, keys[choice])
-        if made is not None:
-            removed = {f"{table}.{key}": None for key in sorted(own - keys[choice])}
-            there = _table(made, steps[:-1])
-            found[choice] = removed | {f"{table}.{key}": there[key] for key in there if key in own}
+        changed = _changed_to_kind(document, steps, choice, keys[choice])
+        if changed is not None:
+            removed = {f"{table}.{key}": None for key in sorted(not_shared - keys[choice])}
+            new_table = _table(changed, steps[:-1])
+            found[choice] = removed | {f"{table}.{key}": new_table[key] for key in new_table if key in not_shared}
     return found
 
 
-def _of_kind(document: dict[str, Any], steps: KeyPath, choice: str, read: set[str]) -> dict[str, Any] | None:
-    """The document with a table of that kind, complete; None where it is refused for another reason.
+def _changed_to_kind(
+    document: dict[str, Any], steps: KeyPath, choice: str, read: set[str]
+) -> dict[str, Any] | None:
+    """The document with the tag at `steps` set to `choice` and its table made complete: keys that this kind does
+    not read are removed, those that it needs get usual values. None where it is refused for another reason.
 
     read  the keys of that kind
     """
@@ -263,7 +283,7 @@ def _of_kind(document: dict[str, Any], steps: KeyPath, choice: str, read: set[st
 
 
 def _table(document: dict[str, Any], steps: KeyPath) -> dict[str, Any]:
-    """The table at a path; an empty one where there is none."""
+    """The table at a path of keys and indices; an empty one where there is none."""
     place: Any = document
     for step in steps:
         place = place[step] if isinstance(step, int) else place.get(step, {})
@@ -274,14 +294,15 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
     """The `DeviceNumber` at a path: value, unit, limits, slider and choices; `given`: whether the file has it."""
     document, path = device.document, dotted(steps, device.document)
     image = schema.mirror_image(steps)
-    table = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))
+    # place of the last key in the path: before it is the path of its table, behind it are indices of an element
+    key_at = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))
     limits, whole = number_limits(document, steps)
     number = value if isinstance(value, int | float) else None
     choices = _choices(document, steps) if number is None else ()
     low, high, scale = (None, None, "linear") if number is None else slider(document, steps, number)
     return DeviceNumber(
         path=path,
-        group=tuple(dotted(steps[:table], document).split(".")) if table else ("device",),
+        group=tuple(dotted(steps[:key_at], document).split(".")) if key_at else ("device",),
         name=number_name(steps),
         value=value if number is None or whole else float(number),
         unit=schema.key_unit(steps),
@@ -295,7 +316,7 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
         scale=scale,
         whole=whole,
         choices=choices,
-        brings=_brings(document, steps, choices),
+        brings=_changes_by_kind(document, steps, choices),
         also=() if image is None else (dotted(image, document),),
         given=given,
     )
@@ -327,14 +348,15 @@ def source_of(steps: KeyPath, document: object, sources: Mapping[str, str]) -> s
     >>> source_of(("plant", "mass_kg"), {}, {"plant": "drawings", "plant.mass_kg": "scales", "loop": "code"})
     'scales'
     """
-    own = dotted(steps, document).split(".")
+    names = dotted(steps, document).split(".")
     best, found = (0, 0), ""
     for path, text in sources.items():
         parts = path.split(".")
-        if parts[0] != own[0] and own[0] == "mechanism":  # as --set takes it, without its first step
+        if parts[0] != names[0] and names[0] == "mechanism":  # as --set takes it, without its first step
             parts = ["mechanism", *parts]
-        if len(parts) > len(own) or any(
-            part not in ("*", name, str(step)) for part, name, step in zip(parts, own, steps, strict=False)
+        if len(parts) > len(names) or any(
+            part not in ("*", step_name, str(step))
+            for part, step_name, step in zip(parts, names, steps, strict=False)
         ):
             continue
         rank = (len(parts), -parts.count("*"))
@@ -357,14 +379,18 @@ USUAL: Final = {
 
 
 def number_limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float, float, tuple[str, ...]], bool]:
-    """Lowest and highest value that the schema allows, which of them is excluded; whether the number is whole."""
+    """Lowest and highest value that the schema allows, which of the two ("lowest", "highest") are not allowed
+    themselves; and whether the number must be whole."""
     kinds = [one for one in schema.subschemas(steps, document) if one.get("type") in ("number", "integer")]
     for kind in kinds:
-        above, below = (_limit(kind, "ge", "minimum"), _limit(kind, "le", "maximum"))
-        over, under = (_limit(kind, "gt", "exclusiveMinimum"), _limit(kind, "lt", "exclusiveMaximum"))
-        excluded = [*(["lowest"] if over is not None else []), *(["highest"] if under is not None else [])]
-        lowest = next((x for x in (over, above) if x is not None), -inf)
-        highest = next((x for x in (under, below) if x is not None), inf)
+        at_least, at_most = (_limit(kind, "ge", "minimum"), _limit(kind, "le", "maximum"))
+        greater_than, less_than = (_limit(kind, "gt", "exclusiveMinimum"), _limit(kind, "lt", "exclusiveMaximum"))
+        excluded = [
+            *(["lowest"] if greater_than is not None else []),
+            *(["highest"] if less_than is not None else []),
+        ]
+        lowest = next((x for x in (greater_than, at_least) if x is not None), -inf)
+        highest = next((x for x in (less_than, at_most) if x is not None), inf)
         return (lowest, highest, tuple(excluded)), kind["type"] == "integer"
     return (-inf, inf, ()), False
 
@@ -378,38 +404,46 @@ def _limit(kind: dict[str, Any], ours: str, standard: str) -> float | None:
 def typical_size(document: dict[str, Any], steps: KeyPath) -> float:
     """Size that a number which is 0 may have: the largest number under its key in the same part of the file, else
     what the schema calls usual for it, else the sampling period for a time and a tenth of the sampling rate for a
-    frequency, else the largest number of its unit in
-    the file, else what is usual for its unit, else 1. Numbers without a unit have nothing in common."""
-    return _of_its_kind(document, steps) or _of_its_unit(document, steps) or USUAL.get(schema.key_unit(steps), 1.0)
+    frequency, else the largest number of its unit in the file, else what is usual for its unit, else 1. Numbers
+    without a unit have nothing in common."""
+    return (
+        _size_of_key(document, steps) or _size_of_unit(document, steps) or USUAL.get(schema.key_unit(steps), 1.0)
+    )
 
 
-def _of_its_kind(document: dict[str, Any], steps: KeyPath) -> float:
-    """Size of numbers like that at a path: the largest of its key, else the usual one; 0 where unknown."""
-    own, period = _key(steps), document.get("loop", {}).get("sampling_period_s", 0.0)
-    beside = [abs(v) for path, v in _finite(document) if _key(path) == own and path[0] == steps[0]]
+def _size_of_key(document: dict[str, Any], steps: KeyPath) -> float:
+    """Size of numbers like that at a path: the largest of the same key in the same part of the file, else the
+    usual one, else by the sampling period for a time or a frequency; 0 where unknown."""
+    key, period = _last_key(steps), document.get("loop", {}).get("sampling_period_s", 0.0)
+    beside = [
+        abs(value) for path, value in _finite_numbers(document) if _last_key(path) == key and path[0] == steps[0]
+    ]
     by_period = {"s": float(period), "Hz": 0.1 / float(period) if period else 0.0}
     return max(beside, default=0.0) or schema.usual_size(steps) or by_period.get(schema.key_unit(steps), 0.0)
 
 
-def _of_its_unit(document: dict[str, Any], steps: KeyPath) -> float:
+def _size_of_unit(document: dict[str, Any], steps: KeyPath) -> float:
     """The largest number of the same unit, which may mean another thing; 0 where there are none."""
     unit = schema.key_unit(steps)
-    alike = [abs(v) for path, v in _finite(document) if unit and schema.key_unit(path) == unit]
+    alike = [abs(value) for path, value in _finite_numbers(document) if unit and schema.key_unit(path) == unit]
     return max(alike, default=0.0)
 
 
-def _finite(document: dict[str, Any]) -> Iterator[tuple[KeyPath, float]]:
+def _finite_numbers(document: dict[str, Any]) -> Iterator[tuple[KeyPath, float]]:
+    """Path and value of each number of the document that is not infinite."""
     return ((path, value) for path, value in address.number_paths(document) if isfinite(value))
 
 
-def _from_zero(document: dict[str, Any], steps: KeyPath) -> float:
-    """Upper end of a slider from 0: some times the usual size of the number, or what others of its unit need."""
-    if kind := _of_its_kind(document, steps):
-        return SPAN * kind
-    return max(SPAN * USUAL.get(schema.key_unit(steps), 0.0), _of_its_unit(document, steps)) or SPAN
+def _slider_end_from_zero(document: dict[str, Any], steps: KeyPath) -> float:
+    """Upper end of a slider from 0: SPAN times the usual size of such numbers, or else what others of its unit
+    need."""
+    if size := _size_of_key(document, steps):
+        return SPAN * size
+    return max(SPAN * USUAL.get(schema.key_unit(steps), 0.0), _size_of_unit(document, steps)) or SPAN
 
 
-def _key(steps: KeyPath) -> str:
+def _last_key(steps: KeyPath) -> str:
+    """The last step of a path that is a key and no index."""
     return next(str(step) for step in reversed(steps) if isinstance(step, str))
 
 
@@ -426,27 +460,29 @@ def slider(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[floa
     (lowest, highest, excluded), whole = number_limits(document, steps)
     scale: Scale = "linear"
     if value < 0.0 or (lowest < 0.0 and not _on_diagonal(steps)):
-        low, high = _either_sign(document, steps, value)
+        low, high = _ends_of_either_sign(document, steps, value)
     elif value == 0.0:
-        low, high = 0.0, SPAN if whole else _from_zero(document, steps)
+        low, high = 0.0, SPAN if whole else _slider_end_from_zero(document, steps)
     elif usual := schema.usual_size(steps):
         low, high = 0.0, SPAN * max(usual, value)
     else:
         low, high = value / SPAN, value * SPAN
         scale = "linear" if whole else "logarithmic"
+    # a limit that is not allowed itself is kept away from
     low = max(low, lowest + NEAR * (value - lowest) if "lowest" in excluded else lowest)
     high = min(high, highest - NEAR * (highest - value) if "highest" in excluded else highest)
     return (ceil(low), floor(high), scale) if whole else (low, high, scale)
 
 
-def _either_sign(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[float, float]:
-    """Ends of a slider of a number that may be negative."""
+def _ends_of_either_sign(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[float, float]:
+    """Lower and upper end of a slider of a number that may be negative; see `slider`."""
     size, unit = abs(value), schema.key_unit(steps)
     if schema.mirror_image(steps) is not None:
         *path, i, j = steps
         rows: Any = document
         for step in path:
             rows = rows[step]
+        # positive definite needs M_ij^2 < M_ii M_jj
         bound = max(size, (1.0 - NEAR) * sqrt(max(rows[i][i] * rows[j][j], 0.0)))
         if bound > 0.0:
             return -bound, bound
@@ -462,12 +498,12 @@ def _either_sign(document: dict[str, Any], steps: KeyPath, value: float) -> tupl
 def _on_diagonal(steps: KeyPath) -> bool:
     """Whether a number stands on the diagonal of a symmetric matrix, which may be written as its diagonal or, of
     one row, as a number."""
-    for depth in range(3):
+    for depth in range(3):  # the matrix is at the path itself, or one or two indices above
         whole, indices = steps[: len(steps) - depth], steps[len(steps) - depth :]
         kinds = schema.subschemas(whole)
         rows = any(one.get("items", {}).get("type") == "array" for one in kinds)
         if rows and any(one.get("type") == "number" for one in kinds):
-            return len(set(indices)) <= 1
+            return len(set(indices)) <= 1  # no index, one of a diagonal, or two that are equal
         if not isinstance(whole[-1], int):
             break
     return False

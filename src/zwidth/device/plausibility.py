@@ -77,7 +77,10 @@ class ImplausibleNumber(UserWarning):
 
 
 def warn_of_implausible(device: Device, stacklevel: int = 2) -> None:
-    """Warn (`ImplausibleNumber`) of each number of a device that looks wrong, on one line each."""
+    """Warn (`ImplausibleNumber`) of each number of a device that looks wrong, on one line each.
+
+    stacklevel  whose line the warning names: 1 the caller of this function, 2 its caller, and so on
+    """
     for fault in implausible(device):
         warnings.warn(str(fault), ImplausibleNumber, stacklevel=stacklevel + 1)
 
@@ -85,56 +88,64 @@ def warn_of_implausible(device: Device, stacklevel: int = 2) -> None:
 def implausible(device: Device) -> list[Fault]:
     """The numbers of a device that look wrong: which, why, and what to type if a unit has slipped."""
     document = device.document
-    numbers = [*_loop(table(document, "loop")), *_plant(table(document, "plant"))]
-    numbers += _operator(table(document, "operator"))
+    numbers = [*_loop_faults(table(document, "loop")), *_plant_faults(table(document, "plant"))]
+    numbers += _operator_faults(table(document, "operator"))
     mechanism = table(document, "mechanism")
     if mechanism:
-        size = _size(mechanism)
-        numbers += [*_lengths(mechanism), *_angles(mechanism), *_links(mechanism, size), *_drives(mechanism, size)]
-        numbers += _beams(device)
+        size = _device_size(mechanism)
+        numbers += [
+            *_length_faults(mechanism),
+            *_angle_faults(mechanism),
+            *_link_faults(mechanism, size),
+            *_drive_faults(mechanism, size),
+        ]
+        numbers += _beam_faults(device)
     if device.response is not None:
-        numbers += _response(device.response)
+        numbers += _response_faults(device.response)
     return [Fault(device.label, dotted(path, document), message) for path, message in numbers]
 
 
-def _loop(loop: dict[str, Any]) -> KeyMessages:
+def _loop_faults(loop: dict[str, Any]) -> KeyMessages:
     """Path and sentence of a sampling period or encoder step of [loop] that looks too large."""
     period, step = loop.get("sampling_period_s", 0.0), table(loop, "encoder").get("resolution_m", 0.0)
     if period > SLOWEST:
         yield (
             ("loop", "sampling_period_s"),
-            f"{period:g} s looks wrong, {1.0 / period:.3g} samples a second; {_thousandth(period, 'ms')}",
+            f"{period:g} s looks wrong, {1.0 / period:.3g} samples a second; {_thousandth_hint(period, 'ms')}",
         )
     if step > COARSEST:
         yield (
             ("loop", "encoder", "resolution_m"),
-            f"{step:g} m looks wrong, a step of {1e3 * step:g} mm; {_thousandth(step, 'mm')}",
+            f"{step:g} m looks wrong, a step of {1e3 * step:g} mm; {_thousandth_hint(step, 'mm')}",
         )
 
 
-def _plant(plant: dict[str, Any]) -> KeyMessages:
+def _plant_faults(plant: dict[str, Any]) -> KeyMessages:
     """Path and sentence of a mass of [plant] that looks too large."""
     heaviest = np.max(np.diag(np.atleast_2d(plant.get("mass_kg", 0.0))))
     if heaviest > HEAVIEST:
         yield (
             ("plant", "mass_kg"),
-            f"{heaviest:g} kg looks wrong for a haptic device; {_thousandth(heaviest, 'g')}",
+            f"{heaviest:g} kg looks wrong for a haptic device; {_thousandth_hint(heaviest, 'g')}",
         )
 
 
-def _operator(operator: dict[str, Any]) -> KeyMessages:
+def _operator_faults(operator: dict[str, Any]) -> KeyMessages:
     """Path and sentence of an arm mass of [operator] that looks too large."""
     mass = operator.get("arm_mass_kg", 0.0)
     if mass > HEAVIEST_ARM:
-        yield ("operator", "arm_mass_kg"), f"{mass:g} kg looks wrong for an arm; {_thousandth(mass, 'g')}"
+        yield ("operator", "arm_mass_kg"), f"{mass:g} kg looks wrong for an arm; {_thousandth_hint(mass, 'g')}"
 
 
-def _lengths(mechanism: dict[str, Any]) -> KeyMessages:
+def _length_faults(mechanism: dict[str, Any]) -> KeyMessages:
     """Path and sentence of each length or position that looks too large [m], of reference and workspace, too."""
     for path, value in _length_keys(mechanism):
-        longest = max((abs(x) for x in _flat(value)), default=0.0)
+        longest = max((abs(x) for x in _numbers_of(value)), default=0.0)
         if longest > LONGEST:
-            yield ("mechanism", *path), f"{longest:g} m looks wrong for a device; {_thousandth(longest, 'mm')}"
+            yield (
+                ("mechanism", *path),
+                f"{longest:g} m looks wrong for a device; {_thousandth_hint(longest, 'mm')}",
+            )
 
 
 def _length_keys(mechanism: dict[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
@@ -150,13 +161,15 @@ def _length_keys(mechanism: dict[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
         yield ("workspace", key), value
 
 
-def _flat(value: Any) -> list[float]:
+def _numbers_of(value: Any) -> list[float]:
+    """The numbers of a single one or of lists within each other, in their order; [] for None."""
     return [] if value is None else [float(x) for x in np.ravel(np.array(value, dtype=float))]
 
 
-def _size(mechanism: dict[str, Any]) -> float:
+def _device_size(mechanism: dict[str, Any]) -> float:
     """Size of the device [m]: the largest of its lengths and its handle's distance from the origin."""
-    given = [(path, _flat(value)) for path, value in _length_keys(mechanism) if path[0] != "workspace"]
+    given = [(path, _numbers_of(value)) for path, value in _length_keys(mechanism) if path[0] != "workspace"]
+    # of a loop's two points, six numbers, the largest coordinate stands for their distance
     sizes = [
         math.hypot(*numbers) if path[-1] != "points_m" or path[0] == "handle" else max(numbers)
         for path, numbers in given
@@ -165,7 +178,7 @@ def _size(mechanism: dict[str, Any]) -> float:
     return max(sizes, default=0.0)
 
 
-def _angles(mechanism: dict[str, Any]) -> KeyMessages:
+def _angle_faults(mechanism: dict[str, Any]) -> KeyMessages:
     """Path and sentence of each angle of links and assemblies that is more than a full turn, as of degrees."""
     angles: list[tuple[KeyPath, Any]] = [
         (("mechanism", *path, "orientation_rad"), link.get("orientation_rad"))
@@ -175,7 +188,7 @@ def _angles(mechanism: dict[str, Any]) -> KeyMessages:
         place: KeyPath = ("mechanism", "assemblies", name, "joints_rad")
         angles += [((*place, joint), angle) for joint, angle in assembly.get("joints_rad", {}).items()]
     for key, value in angles:
-        largest = max(_flat(value), key=abs, default=0.0)
+        largest = max(_numbers_of(value), key=abs, default=0.0)
         if abs(largest) > FULL_TURN:
             yield (
                 key,
@@ -184,7 +197,7 @@ def _angles(mechanism: dict[str, Any]) -> KeyMessages:
             )
 
 
-def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
+def _link_faults(mechanism: dict[str, Any], size: float) -> KeyMessages:
     """Path and sentence of each mass or inertia of a link that looks too large for a device of this size [m]."""
     wrist = table(mechanism, "handle").get("controls") == "orientation"  # which may give no lengths at all
     for path, link in written(mechanism, "links"):
@@ -195,45 +208,47 @@ def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
             yield (
                 ("mechanism", *path, "mass_kg"),
                 f"{mass:g} kg looks wrong beside a moment of inertia of {inertia:g} kg m², a radius of gyration "
-                f"of {_length(gyration)}: no metal is so dense; {_thousandth(mass, 'g')}",
+                f"of {_length_text(gyration)}: no metal is so dense; {_thousandth_hint(mass, 'g')}",
             )
         too_heavy = mass > max(MASSIVE, SOLID * size**3)
         if too_heavy and not dense:
             yield (
                 ("mechanism", *path, "mass_kg"),
-                f"{mass:g} kg looks wrong for a link of a device of {_length(size)}; {_thousandth(mass, 'g')}",
+                f"{mass:g} kg looks wrong for a link of a device of {_length_text(size)}; "
+                f"{_thousandth_hint(mass, 'g')}",
             )
         if size > 0.0 and gyration > GYRATION * size and not wrist:
             yield (
                 ("mechanism", *path, "inertia_kg_m2"),
-                f"{inertia:g} kg m² looks wrong for {mass:g} kg, a radius of gyration of {_length(gyration)} on "
-                f"a device of {_length(size)}; {_inertia_units(inertia, mass / 1e3 if too_heavy else mass, size)}",
+                f"{inertia:g} kg m² looks wrong for {mass:g} kg, a radius of gyration of "
+                f"{_length_text(gyration)} on a device of {_length_text(size)}; "
+                f"{_inertia_hint(inertia, mass / 1e3 if too_heavy else mass, size)}",
             )
 
 
 def _largest_moment(inertia: Any) -> float:
+    """Largest principal moment of an inertia as a file gives it: one number, three moments or a matrix."""
     moments = np.array(inertia, dtype=float)
     return float(np.linalg.eigvalsh(moments)[-1] if moments.ndim == 2 else moments.max())
 
 
 def _least_density(mass: float, gyration: float) -> float:
-    """Of all bodies with this mass and largest radius of gyration a ball is the largest; its density [kg/m³].
-
-    0 for a point: its inertia was left out.
-    """
-    radius = gyration / math.sqrt(0.4)
+    """Density [kg/m³] of a ball with this mass [kg] and radius of gyration [m]: of all bodies with both it is the
+    largest, so that none is less dense. 0 for a radius of 0: the inertia was left out."""
+    radius = gyration / math.sqrt(0.4)  # a ball has the moment 2/5 m r^2
     return mass / (4.0 / 3.0 * math.pi * radius**3) if radius > 0.0 else 0.0
 
 
-def _inertia_units(inertia: float, mass: float, size: float) -> str:
-    """A hint of the unit in which an inertia would be that of a mass [kg] as large as the device [m]."""
-    for name, unit in UNITS:
-        if 0.05 * size < math.sqrt(inertia * unit / mass) < size:
-            return f"if it is in {name}, write {inertia * unit:.4g}"
+def _inertia_hint(inertia: float, mass: float, size: float) -> str:
+    """A hint of the unit in which an inertia would be plausible: its radius of gyration for this mass [kg] then is
+    below the size of the device [m], and above a twentieth of it."""
+    for name, factor in UNITS:
+        if 0.05 * size < math.sqrt(inertia * factor / mass) < size:
+            return f"if it is in {name}, write {inertia * factor:.4g}"
     return "1 kg cm² is 1e-4 kg m², 1 g cm² is 1e-7"
 
 
-def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
+def _drive_faults(mechanism: dict[str, Any], size: float) -> KeyMessages:
     """Path and sentence of each number of a drive that looks wrong. size: that of the device [m]."""
     for below, drive in written(mechanism, "drives"):
         path = ("mechanism", *below)
@@ -253,7 +268,7 @@ def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
         if per_ampere > LARGEST_TORQUE_CONSTANT:
             yield (
                 (*path, "torque_constant_Nm_per_A"),
-                f"{per_ampere:g} N m/A looks wrong for a motor; {_thousandth(per_ampere, 'mN m/A')}",
+                f"{per_ampere:g} N m/A looks wrong for a motor; {_thousandth_hint(per_ampere, 'mN m/A')}",
             )
         counts = drive.get("encoder_counts_per_rev") or math.inf
         if counts < FEWEST_COUNTS:
@@ -268,15 +283,17 @@ def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
             ("coulomb_Nm", STICKIEST),
         ):
             torque = drive.get(key) or 0.0
+            # at the end of a lever as long as the device
             force = torque * ratio / size if size > 0.0 else 0.0
             if math.isfinite(force) and force > strongest:
                 yield (
                     (*path, key),
-                    f"{torque:g} N m looks wrong, some {force:.2g} N at the handle; {_thousandth(torque, 'mN m')}",
+                    f"{torque:g} N m looks wrong, some {force:.2g} N at the handle; "
+                    f"{_thousandth_hint(torque, 'mN m')}",
                 )
 
 
-def _response(response: Response) -> KeyMessages:
+def _response_faults(response: Response) -> KeyMessages:
     """Path and sentence of an implausible mass that a measured response shows, 1/(w^2 |P|), and of repeated sweeps
     that are copies."""
     mass = 1.0 / ((2.0 * math.pi * response.frequency) ** 2 * np.maximum(np.abs(response.value), 1e-300))
@@ -296,31 +313,33 @@ def _response(response: Response) -> KeyMessages:
         )
 
 
-def _thousandth(value: float, unit: str) -> str:
+def _thousandth_hint(value: float, unit: str) -> str:
+    """A hint of what to write if a number is in a unit a thousand times smaller than the file's."""
     return f"if it is in {unit}, write {value / 1e3:.4g}"
 
 
-def _length(metres: float) -> str:
+def _length_text(metres: float) -> str:
     """A length given in metres, written for people with a unit that suits its size."""
     return f"{metres:.3g} m" if metres >= 1.0 else f"{1e3 * metres:.3g} mm"
 
 
-def _beams(device: Device) -> KeyMessages:
-    """Path and sentence of each number of a beam that looks wrong, and of each beam with modes in vain."""
+def _beam_faults(device: Device) -> KeyMessages:
+    """Path and sentence of each number of a beam that looks wrong, and of each beam whose modes are too fast for
+    the loop."""
     mechanism = table(device.document, "mechanism")
-    own = [member for member in members(mechanism, "links") if isinstance(member.entry.get("beam"), dict)]
+    bending = [member for member in members(mechanism, "links") if isinstance(member.entry.get("beam"), dict)]
     seen = set[KeyPath]()
-    modes = _mode_faults(device) if own else {}
-    for member in own:
+    mode_faults = _mode_faults(device) if bending else {}
+    for member in bending:
         path = ("mechanism", *member.path, "beam")
         if path not in seen:
-            yield from _beam_numbers(path, member.entry)
-            if (message := modes.get(member.entry["name"])) is not None:
-                yield (*path, *message[0]), message[1]
+            yield from _beam_number_faults(path, member.entry)
+            if (fault := mode_faults.get(member.entry["name"])) is not None:
+                yield (*path, *fault[0]), fault[1]
         seen.add(path)
 
 
-def _beam_numbers(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
+def _beam_number_faults(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
     """Path and sentence of each number that looks wrong in a link's [beam], which stands at `path`."""
     section, material = table(link["beam"], "section"), link["beam"].get("material")
     for key in ("outer_diameter_m", "diameter_m", "width_m", "height_m"):
@@ -348,33 +367,34 @@ def _beam_numbers(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
 
 
 def _mode_faults(device: Device) -> dict[str, tuple[KeyPath, str]]:
-    """Key below [beam] and sentence by link name, of beams with a first or kept mode too fast for the loop."""
+    """Of beams whose first, or highest kept, mode is too fast for the loop: link name -> key below [beam], () for
+    the whole, and sentence."""
     mechanism, period = device.mechanism, device.controller.sampling_period
     if mechanism is None or not mechanism.flexible or isinstance(period, NotKnown):
         return {}
     half_rate, found = 0.5 / period, dict[str, tuple[KeyPath, str]]()
-    firsts = _first_frequencies(device)
+    first_frequencies = _first_frequencies(device)
     for beam in mechanism.flexible:
-        name, first = mechanism.links.names[beam.link], firsts.get(beam.link, math.nan)
-        highest, fewer = _highest_kept(beam, RESOLVED * half_rate)
+        name, first = mechanism.links.names[beam.link], first_frequencies.get(beam.link, math.nan)
+        highest, resolved = _highest_kept(beam, RESOLVED * half_rate)
         if first > RIGID * half_rate:
             found[name] = (
                 (),
-                f"bends first at {_hertz(first)} with all that it carries, {first / half_rate:.3g} times half the "
-                f"sampling rate ({_hertz(half_rate)}): it is as good as rigid; leave it out",
+                f"bends first at {_hertz_text(first)} with all that it carries, {first / half_rate:.3g} times "
+                f"half the sampling rate ({_hertz_text(half_rate)}): it is as good as rigid; leave it out",
             )
         elif highest > RESOLVED * half_rate:
             found[name] = (
                 ("modes",),
-                f"reach {_hertz(highest)}, {highest / half_rate:.3g} times half the sampling rate "
-                f"({_hertz(half_rate)}), where samples tell nothing of them; write modes = {fewer}",
+                f"reach {_hertz_text(highest)}, {highest / half_rate:.3g} times half the sampling rate "
+                f"({_hertz_text(half_rate)}), where samples tell nothing of them; write modes = {resolved}",
             )
     return found
 
 
 def _first_frequencies(device: Device) -> dict[int, float]:
-    """The first frequency [Hz] at which each beam bends alone, the other links rigid and the motors held, at the
-    reference; {} where that is no posture."""
+    """Link index -> first frequency [Hz] at which its beam bends alone, the other links rigid and the motors held,
+    at the reference; {} where that is no posture."""
     from zwidth.errors import PostureError
     from zwidth.model.mechanism_arrays import pack
     from zwidth.model.motions import Motions
@@ -387,33 +407,34 @@ def _first_frequencies(device: Device) -> dict[int, float]:
             mech, found = pack(device.mechanism), dict[int, float]()
             for beam in device.mechanism.flexible:
                 motions = Motions(mech, posture.angles, (beam,))
-                own = np.diag(motions.elastic_stiffness())[motions.joint_count :]
-                found[beam.link] = float(np.sqrt(np.min(own))) / (2.0 * math.pi) if len(own) else math.inf
+                # w^2 of the beam's coordinates [1/s²], which are modes of unit mass
+                squares = np.diag(motions.elastic_stiffness())[motions.joint_count :]
+                found[beam.link] = float(np.sqrt(np.min(squares))) / (2.0 * math.pi) if len(squares) else math.inf
             return found
     return {}
 
 
 def _highest_kept(beam: FlexibleLink, most: float) -> tuple[float, int]:
-    """The frequency of the highest mode that a beam keeps beside its static deflections [Hz], and how many of them
-    lie below `most`; 0 of a lump.
+    """The frequency [Hz] of the highest mode that a beam keeps beside its static deflections, and how many of
+    these modes lie below `most` [Hz]; 0 and 0 for a beam without modes.
 
-    Assumed modes: of bending in its softer plane, as of a cantilever.
+    Of assumed modes those of bending in its softer plane, as of a cantilever.
     """
     if beam.method == "lumped" or not beam.modes:
         return 0.0, 0
     if beam.method == "finite-elements":
-        kept = slice(-beam.modes, None)
+        kept = slice(-beam.modes, None)  # modes stand behind the static deflections
         M, K = (np.diag(part)[kept] for part in (beam.body.mass, beam.body.stiffness))
-        own = np.sqrt(K / M) / (2.0 * math.pi)
+        frequencies = np.sqrt(K / M) / (2.0 * math.pi)
     else:
-        n = np.arange(1, beam.modes + 1)
+        n = np.arange(1, beam.modes + 1)  # number of each mode
         roots = np.where(n <= len(FIRST_ROOTS), np.resize(FIRST_ROOTS, len(n)), (n - 0.5) * math.pi)
         EI = min(beam.beam.EI_y, beam.beam.EI_z)
-        own = roots**2 / (2.0 * math.pi * beam.beam.length**2) * math.sqrt(EI / beam.beam.mass_per_length)
-    return float(own[-1]), int(np.count_nonzero(own <= most))
+        frequencies = roots**2 / (2.0 * math.pi * beam.beam.length**2) * math.sqrt(EI / beam.beam.mass_per_length)
+    return float(frequencies[-1]), int(np.count_nonzero(frequencies <= most))
 
 
-def _hertz(frequency: float) -> str:
+def _hertz_text(frequency: float) -> str:
     return f"{frequency / 1e3:.4g} kHz" if frequency >= 1e4 else f"{frequency:.4g} Hz"
 
 
@@ -431,7 +452,7 @@ def missing_numbers(document: dict[str, Any]) -> dict[str, tuple[str, ...]]:
     """
     if "mechanism" not in document:
         return {}
-    dynamics = [dotted(path, document) for path in _left_out(document["mechanism"])]
+    dynamics = [dotted(path, document) for path in _keys_left_out(document["mechanism"])]
     sampling = [] if "sampling_period_s" in table(document, "loop") else [dotted(PERIOD)]
     found = {"dynamics": tuple(dict.fromkeys(dynamics)), "sampling": tuple(sampling)}
     return {kind: keys for kind, keys in found.items() if keys}
@@ -450,7 +471,7 @@ def partly_missing(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
                 yield from (("mechanism", *path, key) for path in dict.fromkeys(without))
 
 
-def _left_out(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
+def _keys_left_out(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
     """Path of each key about mass or drive that a link or drive of a file leaves out."""
     for group, keys in (("links", LINKS), ("drives", DRIVES)):
         for member in members(mechanism, group):
@@ -481,7 +502,7 @@ class Unknown:
     @property
     def names(self) -> str:
         """Names of the links or drives that lack the number, or the word all."""
-        names = [path.split(".")[-2] for path in self.paths]
+        names = [path.split(".")[-2] for path in self.paths]  # a path ends in the name and the key
         return "all" if len(names) == self.count else comma_list(names, 6)
 
 

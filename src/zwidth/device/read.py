@@ -48,7 +48,7 @@ def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = Fals
 def read_head(path: str | os.PathLike[str], most: int, *, pipes: bool = False) -> bytes:
     """The first bytes of a plain file, at most so many; as `read_plain`, but for its size."""
     try:
-        if wrong := _no_plain_file(os.stat(path).st_mode, pipes):
+        if wrong := _not_plain_message(os.stat(path).st_mode, pipes):
             raise FileError(wrong)
         with open(path, "rb") as stream:
             return stream.read(most)
@@ -63,8 +63,9 @@ def read_head(path: str | os.PathLike[str], most: int, *, pipes: bool = False) -
         raise FileError("cannot be read: its name holds a zero byte") from None
 
 
-def _no_plain_file(mode: int, pipes: bool) -> str:
-    """What something other than a plain file is; "" for a plain file, or a pipe where those are taken."""
+def _not_plain_message(mode: int, pipes: bool) -> str:
+    """What is wrong with a path that leads to no plain file, by its mode (`os.stat`); "" for a plain file, or a
+    pipe where those are taken."""
     if stat.S_ISREG(mode) or (pipes and stat.S_ISFIFO(mode)):
         return ""
     if stat.S_ISDIR(mode):
@@ -114,9 +115,9 @@ def header_fault(header: Sequence[str], needed: Sequence[str], optional: Collect
     twice = [name for name in (*needed, *optional) if header.count(name) > 1]
     faults = []
     if missing:
-        faults.append(f"{_columns(missing)} missing")
+        faults.append(f"{_columns_and_verb(missing)} missing")
     if twice:
-        faults.append(f"{_columns(twice)} there more than once")
+        faults.append(f"{_columns_and_verb(twice)} there more than once")
     if not faults:
         return ""
     other = next((name for mark, name in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)
@@ -125,7 +126,7 @@ def header_fault(header: Sequence[str], needed: Sequence[str], optional: Collect
     return f"{' and '.join(faults)}; needed are {', '.join(needed)}"
 
 
-def _columns(names: Sequence[str]) -> str:
+def _columns_and_verb(names: Sequence[str]) -> str:
     """Subject and verb of a sentence: "column a is", "columns a, b are"."""
     return f"column {names[0]} is" if len(names) == 1 else f"columns {', '.join(names)} are"
 
@@ -215,13 +216,13 @@ DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
 
 def bundled_names(shelf: BundledFiles = DEVICES) -> list[str]:
     """Names of the bundled devices, sorted."""
-    entries = (entry.name for entry in _place(shelf).iterdir())
+    entries = (entry.name for entry in _folder_of(shelf).iterdir())
     return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
 
 
 def first_bundled() -> str:
     """The bundled device that is shown where none is named: the file `first` of their folder names it."""
-    return str((_place(DEVICES) / "first").read_text(encoding="utf-8")).strip()
+    return str((_folder_of(DEVICES) / "first").read_text(encoding="utf-8")).strip()
 
 
 def bundled(shelf: BundledFiles = DEVICES) -> list[tuple[str, str, str]]:
@@ -250,12 +251,12 @@ def read(
         raise fail(shelf.noun, "", message)
     if label in names:
         return parse_document(_bundled_text(label, shelf), label, shelf), label
-    return parse_document(_text(label, shelf, pipes), label, shelf), label
+    return parse_document(_text_of_file(label, shelf, pipes), label, shelf), label
 
 
 def device_text(label: str) -> str:
     """The text of a bundled device or of a file, as it is written. Raises DeviceError where there is none."""
-    return _bundled_text(label, DEVICES) if label in bundled_names() else _text(label, DEVICES, False)
+    return _bundled_text(label, DEVICES) if label in bundled_names() else _text_of_file(label, DEVICES, False)
 
 
 def parse_document(text: str, label: str, shelf: BundledFiles = DEVICES) -> dict[str, Any]:
@@ -291,16 +292,20 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
     return False
 
 
-def _text(label: str, shelf: BundledFiles, pipes: bool) -> str:
+def _text_of_file(label: str, shelf: BundledFiles, pipes: bool) -> str:
     """The text of a file. Raises DeviceError where it is missing or no text, with the nearest bundled name."""
     try:
         return read_text(label, LARGEST_FILE, pipes=pipes)
     except FileError as error:
-        wrong = _not_found(label, shelf) if error.missing else f"{error}; give {shelf.file_noun} or a bundled name"
+        wrong = (
+            _not_found_message(label, shelf)
+            if error.missing
+            else f"{error}; give {shelf.file_noun} or a bundled name"
+        )
         raise fail(label, "", wrong) from None
 
 
-def _not_found(label: str, shelf: BundledFiles) -> str:
+def _not_found_message(label: str, shelf: BundledFiles) -> str:
     """The sentence for a name that is neither a file nor a bundled one, with the nearest bundled name."""
     names = bundled_names(shelf)
     near = nearest(Path(label).name.removesuffix(".toml"), names)
@@ -310,10 +315,11 @@ def _not_found(label: str, shelf: BundledFiles) -> str:
 
 
 def _bundled_text(name: str, shelf: BundledFiles) -> str:
-    return str((_place(shelf) / f"{name}.toml").read_text(encoding="utf-8"))
+    return str((_folder_of(shelf) / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def _place(shelf: BundledFiles) -> Any:
+def _folder_of(shelf: BundledFiles) -> Any:
+    """The folder of bundled files in the installed package."""
     return files("zwidth.device") / shelf.folder
 
 
@@ -337,10 +343,10 @@ def toml_fault(text: str, error: tomllib.TOMLDecodeError) -> str:
     'line 1: 0,045 has a decimal comma; write 0.045'
     """
     message, lines = str(error), text.splitlines()
-    place = PLACE.search(message)
+    where = PLACE.search(message)
     # an error "at end of document" is one of the last line that holds anything
-    filled = [k for k, line in enumerate(lines, 1) if line.strip()]
-    number = int(place[1]) if place and place[1] else (filled[-1] if filled else 1)
+    filled = [n for n, line in enumerate(lines, 1) if line.strip()]
+    number = int(where[1]) if where and where[1] else (filled[-1] if filled else 1)
     line = lines[number - 1] if number <= len(lines) else ""
     comma = DECIMAL_COMMA.search(line)
     if comma and "Expected newline" in message:

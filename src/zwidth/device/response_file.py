@@ -20,9 +20,8 @@ from zwidth.model.raw_sweep import sweep_response
 from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, mean_path
 
 Table = dict[str, Floats]  # columns, with the line of each row under LINE
-Cause = tuple[
-    str, list[tuple[int, str]]
-]  # what is wrong with a column ("": with the row): every line, and a sentence
+# The column with which something is wrong ("": with the row), and of each line its number and a sentence.
+Cause = tuple[str, list[tuple[int, str]]]
 
 SPECTRUM: Final = ("frequency_Hz", "real_m_per_N", "imag_m_per_N")
 RECORD: Final = ("time_s", "force_command_N", "position_m")
@@ -50,6 +49,7 @@ def read_response(section: ResponseSection, label: str, period: float) -> Respon
     """
     names = section.files or (section.file or "",)
     folder = Path(label).parent
+    # key of [response] and name of every file
     given = [("response.files" if section.files else "response.file", name) for name in names]
     given += [("response.handle_file", section.handle_file)] if section.handle_file else []
     outside = [(key, name) for key, name in given if not _lies_in(folder, folder / name)]
@@ -58,11 +58,12 @@ def read_response(section: ResponseSection, label: str, period: float) -> Respon
         raise DeviceError(Fault(label, key, wrong.format(quote(name))) for key, name in outside)
     responses = [one for name in names for one in _responses(folder / name, section, period)]
     first = responses[0]
+    # of files with several sweeps, each compares its own
     for name, other in zip(
         [names[0], *names[1:]] if len(names) == len(responses) else [], responses, strict=False
     ):
         _check_frequencies(folder / name, other.frequency, first.frequency, names[0])
-    response = first if len(responses) == 1 else _mean(responses)
+    response = first if len(responses) == 1 else _mean_response(responses)
     paths = {} if response.handle is None else _paths_of(response.handle)
     if section.handle_file is not None:
         frequency, more = _handle_experiment(folder / section.handle_file, section, period)
@@ -76,55 +77,63 @@ def read_response(section: ResponseSection, label: str, period: float) -> Respon
         paths |= more
     at_sensor, actuator = section.handle_at == "sensor", section.actuator_at == "sensor"
     if at_sensor or actuator or paths:
-        handle = _handle(paths, at_sensor=at_sensor, actuator_at_sensor=actuator)
+        handle = _measured_handle(paths, at_sensor=at_sensor, actuator_at_sensor=actuator)
         response = replace(response, handle=handle)
     return replace(response, delay=section.hardware_delay_samples)
 
 
-def _check_frequencies(path: Path, frequency: Floats, first: Floats, name: str) -> None:
-    """Raise DeviceError for other frequencies than those of the first file, of this name."""
+def _check_frequencies(path: Path, frequency: Floats, first: Floats, first_name: str) -> None:
+    """Raise DeviceError where the frequencies of a file, `path`, are not those of the first file, called
+    `first_name`."""
     if len(frequency) != len(first) or np.any(np.abs(frequency - first) > 1e-6 * first):
-        raise fail(str(path), "", f"has other frequencies than {name}; sweeps must share them")
+        raise fail(str(path), "", f"has other frequencies than {first_name}; sweeps must share them")
 
 
-def _handle(
+def _measured_handle(
     paths: Mapping[str, MeasuredPath], *, at_sensor: bool = False, actuator_at_sensor: bool = False
 ) -> MeasuredHandle:
-    """A `MeasuredHandle` from measured paths by its field names."""
-    into, out, own = (paths.get(name) for name in HANDLE_PATHS)
-    return MeasuredHandle(into, out, own, at_sensor, actuator_at_sensor)
+    """A `MeasuredHandle` from measured paths by its field names, those not measured left out.
+
+    at_sensor, actuator_at_sensor  whether the hand, or the command, acts on what the encoder reads
+    """
+    force_to_encoder, command_to_handle, force_to_handle = (paths.get(name) for name in HANDLE_PATHS)
+    return MeasuredHandle(force_to_encoder, command_to_handle, force_to_handle, at_sensor, actuator_at_sensor)
 
 
 def _paths_of(handle: MeasuredHandle) -> dict[str, MeasuredPath]:
-    """The measured paths of a handle by field."""
+    """The measured paths of a handle by field of `MeasuredHandle`; those not measured are left out."""
     paths = {name: getattr(handle, name) for name in HANDLE_PATHS}
     return {name: path for name, path in paths.items() if path is not None}
 
 
-def _mean(responses: Sequence[Response]) -> Response:
+def _mean_response(responses: Sequence[Response]) -> Response:
     """The mean of repeated sweeps; its coherence at each frequency is that of the worst sweep."""
     first = responses[0]
-    whole = mean_path([MeasuredPath(response.value, response.coherence) for response in responses])
+    mean = mean_path([MeasuredPath(response.value, response.coherence) for response in responses])
     note = f"mean of {len(responses)} sweeps" + (f", each {first.note}" if first.note else "")
     handle = None
     if first.handle is not None:
-        every = [_paths_of(response.handle) for response in responses if response.handle is not None]
-        shared = [name for name in HANDLE_PATHS if all(name in paths for paths in every)]
-        if len(every) == len(responses):
-            handle = _handle({name: mean_path([paths[name] for paths in every]) for name in shared})
-    return replace(
-        first, value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps, note=note, handle=handle
-    )
+        paths_by_sweep = [_paths_of(response.handle) for response in responses if response.handle is not None]
+        shared = [name for name in HANDLE_PATHS if all(name in paths for paths in paths_by_sweep)]
+        if len(paths_by_sweep) == len(responses):
+            handle = _measured_handle(
+                {name: mean_path([paths[name] for paths in paths_by_sweep]) for name in shared}
+            )
+    return replace(first, value=mean.value, coherence=mean.coherence, sweeps=mean.sweeps, note=note, handle=handle)
 
 
 def _handle_experiment(
     path: Path, section: ResponseSection, period: float
 ) -> tuple[Floats, dict[str, MeasuredPath]]:
-    """Frequencies and paths, by field, of the experiment in which the handle is pushed."""
+    """Frequencies (f,) [Hz] and paths, by field of `MeasuredHandle`, of the experiment in which the handle is
+    pushed; of several sweeps in its file their mean.
+
+    period  sampling period T [s]
+    """
     table = _table(path, of_handle=True)
     if "time_s" in table:
         _check_time(path, table, period)
-        _check_rest(path, table, "force_command_N", "handle_force_N")
+        _check_other_force_rests(path, table, "force_command_N", "handle_force_N")
         columns = {"force_to_encoder": "position_m", "force_to_handle": "handle_position_m"}
         found = {
             name: _record_response(path, table["handle_force_N"], table[column], section, period)
@@ -132,20 +141,26 @@ def _handle_experiment(
             if column in table
         }
         frequency = found["force_to_encoder"].frequency
-        return frequency, {name: MeasuredPath(one.value, one.coherence) for name, one in found.items()}
+        return frequency, {
+            name: MeasuredPath(response.value, response.coherence) for name, response in found.items()
+        }
     if "sweep" not in table:
         _check_spectrum(path, table, period)
         return table["frequency_Hz"], _handle_paths(table)
-    parts = [{key: column[table["sweep"] == n] for key, column in table.items()} for n in _sweep_numbers(table)]
-    for n, part in zip(_sweep_numbers(table), parts, strict=True):
+    parts = [
+        {key: column[table["sweep"] == sweep] for key, column in table.items()} for sweep in _sweep_numbers(table)
+    ]
+    for sweep, part in zip(_sweep_numbers(table), parts, strict=True):
         _check_spectrum(path, part, period)
-        _check_sweep(path, n, part["frequency_Hz"], parts[0]["frequency_Hz"])
-    every = [_handle_paths(part) for part in parts]
-    return parts[0]["frequency_Hz"], {name: mean_path([paths[name] for paths in every]) for name in every[0]}
+        _check_sweep(path, sweep, part["frequency_Hz"], parts[0]["frequency_Hz"])
+    paths_by_sweep = [_handle_paths(part) for part in parts]
+    return parts[0]["frequency_Hz"], {
+        name: mean_path([paths[name] for paths in paths_by_sweep]) for name in paths_by_sweep[0]
+    }
 
 
 def _handle_paths(table: Table) -> dict[str, MeasuredPath]:
-    """The paths of the handle that a table holds, by field."""
+    """The paths of the handle that a table of spectra holds, by field of `MeasuredHandle`."""
     paths = {}
     for field, name in HANDLE_PATHS.items():
         real, imaginary = (table.get(f"{name}_{part}_m_per_N") for part in ("real", "imag"))
@@ -159,10 +174,12 @@ def _sweep_numbers(table: Table) -> list[float]:
     return list(dict.fromkeys(table["sweep"].tolist()))
 
 
-def _check_sweep(path: Path, n: float, frequency: Floats, first: Floats) -> None:
-    """Raise DeviceError for other frequencies than those of the first sweep."""
+def _check_sweep(path: Path, sweep: float, frequency: Floats, first: Floats) -> None:
+    """Raise DeviceError where the frequencies of the sweep of this number are not those of the first."""
     if len(frequency) != len(first) or np.any(frequency != first):
-        raise fail(str(path), "sweep", f"sweep {n:g} has other frequencies than the first; sweeps must share them")
+        raise fail(
+            str(path), "sweep", f"sweep {sweep:g} has other frequencies than the first; sweeps must share them"
+        )
 
 
 def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[Response]:
@@ -176,16 +193,17 @@ def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[
         return
     numbers = table["sweep"]
     parts = [
-        _spectrum(path, {key: column[numbers == n] for key, column in table.items()}, section, period)
-        for n in _sweep_numbers(table)
+        _spectrum(path, {key: column[numbers == sweep] for key, column in table.items()}, section, period)
+        for sweep in _sweep_numbers(table)
     ]
-    for n, part in zip(_sweep_numbers(table), parts, strict=True):
-        _check_sweep(path, n, part.frequency, parts[0].frequency)
+    for sweep, part in zip(_sweep_numbers(table), parts, strict=True):
+        _check_sweep(path, sweep, part.frequency, parts[0].frequency)
     yield from parts
 
 
 def _spectrum(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
-    """A response read unchanged, its frequencies checked."""
+    """The response of a table with frequencies and complex values. Raises DeviceError for what cannot be a
+    spectrum."""
     _check_spectrum(path, table, period)
     value = table["real_m_per_N"] + 1j * table["imag_m_per_N"]
     if not np.any(value):
@@ -197,25 +215,25 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
         section.integrators,
         table.get("coherence"),
         section.averages or 1.0,
-        handle=_handle(paths) if paths else None,
+        handle=_measured_handle(paths) if paths else None,
     )
 
 
 def _check_spectrum(path: Path, table: Table, period: float) -> None:
     """Raise DeviceError for frequencies that do not rise up to half the rate, and for a coherence out of range."""
-    f, lines = table["frequency_Hz"], table[LINE].astype(int)
-    half = 0.5 / period
-    low, twice, falling = f <= 0.0, np.diff(f) == 0.0, np.diff(f) < 0.0
-    above = np.flatnonzero(f > half * (1.0 + 1e-9))
+    frequency, lines = table["frequency_Hz"], table[LINE].astype(int)
+    nyquist = 0.5 / period
+    low, twice, falling = frequency <= 0.0, np.diff(frequency) == 0.0, np.diff(frequency) < 0.0
+    above = np.flatnonzero(frequency > nyquist * (1.0 + 1e-9))
     causes: list[Cause] = [
-        ("frequency_Hz", [(lines[i], text.format(f[i], f[i - 1])) for i in rows])
-        for rows, text in (
+        ("frequency_Hz", [(lines[i], text.format(frequency[i], frequency[i - 1])) for i in rows])
+        for rows, text in (  # text: of a frequency and the one before it
             (np.flatnonzero(low), "must be greater than 0, got {:.10g}; leave the static value out"),
             (np.flatnonzero(twice) + 1, "{:.10g} is there twice; keep one of them"),
             (np.flatnonzero(falling) + 1, "{:.10g} follows {:.10g}; sort the lines by rising frequency"),
             (
                 above[:1],
-                f"{{:.10g}} is above half the sampling rate, {half:.10g}; leave it out, or correct "
+                f"{{:.10g}} is above half the sampling rate, {nyquist:.10g}; leave it out, or correct "
                 "sampling_period_s",
             ),
         )
@@ -226,12 +244,12 @@ def _check_spectrum(path: Path, table: Table, period: float) -> None:
         causes.append(
             ("coherence", [(lines[i], f"must be from 0 to 1, got {coherence[i]:.10g}") for i in outside])
         )
-    _raise(path, causes)
-    if len(f) < 6:
+    _raise_causes(path, causes)
+    if len(frequency) < 6:
         raise fail(
             str(path),
             "",
-            f"has {plural(len(f), 'frequency', 'frequencies')}; at least 6 are needed, "
+            f"has {plural(len(frequency), 'frequency', 'frequencies')}; at least 6 are needed, "
             "a few hundred for an accurate chart",
         )
 
@@ -239,7 +257,7 @@ def _check_spectrum(path: Path, table: Table, period: float) -> None:
 def _response_of_record(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
     """A raw sweep as a response, with that of the handle where it was recorded."""
     _check_time(path, table, period)
-    _check_rest(path, table, "handle_force_N", "force_command_N")
+    _check_other_force_rests(path, table, "handle_force_N", "force_command_N")
     force = table["force_command_N"]
     response = _record_response(path, force, table["position_m"], section, period)
     if "handle_position_m" not in table:
@@ -258,17 +276,21 @@ def _record_response(
         raise fail(str(path), "", str(error)) from None
 
 
-def _check_rest(path: Path, table: Table, resting: str, excited: str) -> None:
-    """Raise DeviceError where the other force is not constant: its answer would count as that of the first."""
+def _check_other_force_rests(path: Path, table: Table, resting: str, excited: str) -> None:
+    """Raise DeviceError where a force that is to rest is not constant: its answer would count as that of the
+    other.
+
+    resting, excited  columns of the force that is to rest, and of the one that drives the experiment
+    """
     if resting not in table:
         return
-    swing, other = float(np.ptp(table[resting])), float(np.ptp(table[excited]))
-    if swing > RESTING * other:
+    resting_swing, excited_swing = float(np.ptp(table[resting])), float(np.ptp(table[excited]))
+    if resting_swing > RESTING * excited_swing:
         raise fail(
             str(path),
             resting,
-            f"varies by {swing:.4g} N while {excited} is the excitation; keep it constant, and record the other "
-            "experiment in a file of its own (response.file: the command, response.handle_file: the handle)",
+            f"varies by {resting_swing:.4g} N while {excited} is the excitation; keep it constant, and record the "
+            "other experiment in a file of its own (response.file: the command, response.handle_file: the handle)",
         )
 
 
@@ -278,23 +300,24 @@ def _check_time(path: Path, table: Table, period: float) -> None:
     steps = np.diff(time)
     if len(steps) == 0:
         raise fail(str(path), "", "has one line only; record a sweep")
-    mean = float(np.median(steps))
-    if mean <= 0.0:
+    usual = float(np.median(steps))
+    if usual <= 0.0:
         raise fail(
             str(path),
             f"line {lines[1]}: time_s",
-            f"does not rise: the time falls or stands still, by {mean:.6g} s from most lines to the next; sort "
+            f"does not rise: the time falls or stands still, by {usual:.6g} s from most lines to the next; sort "
             "the lines by rising time",
         )
-    uneven = np.flatnonzero(np.abs(steps - mean) > UNEVEN * mean)
+    uneven = np.flatnonzero(np.abs(steps - usual) > UNEVEN * usual)
     if len(uneven):
         i = int(uneven[0])
         raise fail(
             str(path),
             f"line {lines[i + 1]}: time_s",
-            f"comes {steps[i]:.6g} s after the line before, most others {mean:.6g} s; a sweep needs every sample, "
-            "evenly spaced",
+            f"comes {steps[i]:.6g} s after the line before, most others {usual:.6g} s; a sweep needs every "
+            "sample, evenly spaced",
         )
+    # the jitter of single steps averages out of this one
     mean = float((time[-1] - time[0]) / len(steps))
     if abs(mean - period) > PERIOD_TOLERANCE * period:
         raise fail(
@@ -306,17 +329,18 @@ def _check_time(path: Path, table: Table, period: float) -> None:
 
 
 def _table(path: Path, *, of_handle: bool = False) -> Table:
-    """The columns wanted, as numbers, and each row's line.
+    """The columns wanted of a CSV file by name, as numbers, and under LINE the line of each row. Raises
+    DeviceError.
 
     of_handle  whether of the experiment in which the handle is pushed
     """
-    rows = csv.reader(_text(path).splitlines(), strict=True)
+    rows = csv.reader(_csv_text(path).splitlines(), strict=True)
     values: list[list[float]] = []
     lines: list[int] = []
     uneven: list[tuple[int, str]] = []
     try:
         header = [name.strip() for name in next(non_blank_rows(rows), [])]
-        columns = _columns(path, header, of_handle)
+        columns = _columns_to_read(path, header, of_handle)
         places = [header.index(name) for name in columns]
         wrong: dict[str, list[tuple[int, str]]] = {name: [] for name in columns}
         for row in non_blank_rows(rows):
@@ -325,29 +349,33 @@ def _table(path: Path, *, of_handle: bool = False) -> Table:
                 uneven.append((rows.line_num, f"{text}; write a decimal point, not a comma"))
                 continue
             cells = [row[place].strip() if place < len(row) else "" for place in places]
-            numbers = [_number(cell) for cell in cells]
+            numbers = [_number_or_nan(cell) for cell in cells]
             for name, cell, number in zip(columns, cells, numbers, strict=True):
                 if not np.isfinite(number):
-                    wrong[name].append((rows.line_num, f"must be a finite number, {_got(cell)}"))
+                    wrong[name].append((rows.line_num, f"must be a finite number, {_got_text(cell)}"))
             values.append(numbers)
             lines.append(rows.line_num)
     except csv.Error as error:
         raise fail(str(path), f"line {rows.line_num}", f"is not CSV: {error}") from None
-    _raise(path, [("", uneven), *wrong.items()])
+    _raise_causes(path, [("", uneven), *wrong.items()])
     if not values:
         raise fail(str(path), "", f"holds no numbers; give lines with {', '.join(columns)}")
     table = np.array(values).T
     return {LINE: np.array(lines, dtype=float), **dict(zip(columns, table, strict=True))}
 
 
-def _columns(path: Path, header: list[str], of_handle: bool) -> list[str]:
-    """Columns to read by a header: of a response or, with time_s, of a raw sweep. Raises DeviceError."""
+def _columns_to_read(path: Path, header: list[str], of_handle: bool) -> list[str]:
+    """Columns to read by a header: of a response or, with time_s, of a raw sweep. Raises DeviceError where one is
+    missing.
+
+    of_handle  whether of the experiment in which the handle is pushed
+    """
     if not header:
         raise fail(str(path), "", f"is empty; its first line must name columns, such as {', '.join(SPECTRUM)}")
     wanted: tuple[str, ...]
     if "time_s" in header:
         wanted, other = (HANDLE_RECORD, RECORD) if of_handle else (RECORD, HANDLE_RECORD)
-        more: tuple[str, ...] = ("handle_position_m", other[1])
+        if_there: tuple[str, ...] = ("handle_position_m", other[1])  # the force that is to rest
     else:
         paths = [name for name in HANDLE_PATHS.values() if not of_handle or name.startswith("handle")]
         pairs = [[f"{name}_{part}_m_per_N" for part in ("real", "imag")] for name in paths]
@@ -356,15 +384,16 @@ def _columns(path: Path, header: list[str], of_handle: bool) -> list[str]:
             needed = ", ".join(["frequency_Hz", *pairs[0]])
             raise fail(str(path), "line 1", f"has no path from the handle's force; needed are {needed}")
         columns = [column for pair in given for column in pair]
-        wanted, more = (("frequency_Hz",) if of_handle else SPECTRUM) + tuple(columns), OPTIONAL
-    optional = [name for name in more if name in header]
+        wanted, if_there = (("frequency_Hz",) if of_handle else SPECTRUM) + tuple(columns), OPTIONAL
+    optional = [name for name in if_there if name in header]
     if fault := header_fault(header, wanted, optional):
         raise fail(str(path), "line 1", fault)
     return [*wanted, *optional]
 
 
-def _raise(path: Path, causes: Iterable[Cause]) -> None:
-    """Raise DeviceError with the first lines of every cause, and how many more there are of it."""
+def _raise_causes(path: Path, causes: Iterable[Cause]) -> None:
+    """Raise DeviceError with the first lines of every cause, and how many more there are of it; nothing without
+    causes."""
     faults = []
     for column, places in causes:
         faults += [
@@ -379,7 +408,7 @@ def _raise(path: Path, causes: Iterable[Cause]) -> None:
         raise DeviceError(faults)
 
 
-def _number(cell: str) -> float:
+def _number_or_nan(cell: str) -> float:
     """The number in a cell of a table; nan for other text."""
     try:
         return float(cell)
@@ -387,7 +416,7 @@ def _number(cell: str) -> float:
         return float("nan")
 
 
-def _got(cell: str) -> str:
+def _got_text(cell: str) -> str:
     return f"got {cell[:60]!r}" if cell else "but it is missing"
 
 
@@ -404,7 +433,7 @@ def _lies_in(folder: Path, path: Path) -> bool:
         return False
 
 
-def _text(path: Path) -> str:
+def _csv_text(path: Path) -> str:
     """The text of a CSV file. Raises DeviceError where it cannot be read."""
     try:
         return read_text(path, LARGEST_TABLE)

@@ -49,37 +49,40 @@ def validation_messages(
                           sentence on a key that there is not
     """
     details = error.errors(include_url=False)
-    located = [(_where(detail, document), detail) for detail in details]
+    located = [(_path_of(detail, document), detail) for detail in details]
     missing = {path for path, detail in located if detail["type"] == "missing"}
+    # missing keys whose table has a key with almost the same name
     misspelt = {
         (*path[:-1], near)
         for path, detail in located
         if detail["type"] == "extra_forbidden"
-        and (near := nearest(str(path[-1]), [str(p[-1]) for p in missing if p[:-1] == path[:-1]]))
+        and (near := nearest(str(path[-1]), [str(other[-1]) for other in missing if other[:-1] == path[:-1]]))
     }
     for path, detail in located:
         is_misspelt = detail["type"] == "missing" and path in misspelt
-        if not is_misspelt and not _long_enough(detail):
+        if not is_misspelt and not _long_enough_as_given(detail):
             if detail["type"] == "extra_forbidden":
-                yield path, unknown(path) if unknown else _unknown(path, document)
+                yield path, unknown(path) if unknown else _unknown_key_sentence(path, document)
             else:
                 meaning = description(path) if path else ""
                 yield path, _sentence(detail, path, f" ({meaning})" if meaning else "")
 
 
-def _long_enough(detail: ErrorDetails) -> bool:
-    """Whether a list counts as too short only because its faulty elements, which have their own message, do not
-    count."""
+def _long_enough_as_given(detail: ErrorDetails) -> bool:
+    """Whether pydantic calls a list too short although the file gives enough elements: it does not count faulty
+    ones, which have their own message."""
     limits = detail.get("ctx", {})
     return detail["type"] == "too_short" and len(detail["input"]) >= limits["min_length"]
 
 
-def _where(detail: ErrorDetails, document: Any) -> KeyPath:
-    """Path of pydantic's error in the document, without steps that pydantic adds (tags, lifted numbers)."""
+def _path_of(detail: ErrorDetails, document: Any) -> KeyPath:
+    """Path of pydantic's error in the document, without steps that pydantic adds (tags, lifted numbers). Of a
+    table whose kind is unknown, the path of the key that names it."""
     path: list[str | int] = []
     *outer, last = detail["loc"] or ("",)
+    # a missing key, which is last, cannot be followed into the document
     for part in (*outer, last) if detail["type"] != "missing" else outer:
-        if part == "[key]":
+        if part == "[key]":  # of an error in a key's name
             continue
         if isinstance(document, dict) and part in document:
             document = document[str(part)]
@@ -96,7 +99,7 @@ def _where(detail: ErrorDetails, document: Any) -> KeyPath:
 def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
     """What pydantic found as a sentence after the key: what it must be, what came.
 
-    about  what the key means, with a separator; "" where it is known
+    about  what the key means, in brackets after a space; "" where the schema does not say
     """
     kind, got = detail["type"], detail["input"]
     limits: Mapping[str, Any] = detail.get("ctx", {})
@@ -106,7 +109,7 @@ def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
         case "missing":
             return f"is missing; add it{about}"
         case "too_short" | "too_long":
-            return _length(limits, got, about)
+            return _length_sentence(limits, got, about)
         case "string_type":
             return f"must be text, got {quote(got)}{about}"
         case "string_too_short":
@@ -116,7 +119,7 @@ def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
         case "string_pattern_mismatch":
             return f"must be a name of letters, digits, - and _ that begins with a letter, got {quote(got)}"
         case "literal_error":
-            return _literal(limits["expected"], got, about)
+            return _literal_sentence(limits["expected"], got, about)
         case "union_tag_invalid":
             kinds = [tag.strip("'") for tag in limits["expected_tags"].split(", ")]
             near = nearest(str(limits["tag"]), kinds)
@@ -162,7 +165,7 @@ def _number_demand(kind: str, limits: Mapping[str, Any], got: object) -> str:
             return ""
 
 
-def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
+def _unknown_key_sentence(path: KeyPath, document: dict[str, Any]) -> str:
     """The sentence for a key that its table does not read: the kinds or the section that have it, the key in SI
     units, or the nearest one."""
     key, table = str(path[-1]), path[:-1]
@@ -181,11 +184,11 @@ def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
         ]
         if elsewhere and table != (elsewhere[0],):
             return f"is not a key here; it belongs into [{elsewhere[0]}]"
-    converted = _in_si(key, _value(document, path), allowed)
+    converted = _si_hint(key, _value(document, path), allowed)
     return f"is not a key of a device file; {converted or suggestion(key, allowed)}"
 
 
-def _in_si(key: str, value: Any, allowed: Collection[str]) -> str:
+def _si_hint(key: str, value: Any, allowed: Collection[str]) -> str:
     """A hint for a key in another unit: the allowed key in SI units and its number; empty where there is none."""
     known = isinstance(value, int | float) and not isinstance(value, bool)
     if re.fullmatch(r"sampl\w*_(?:frequency|rate)(?:_k?Hz)?", key) and "sampling_period_s" in allowed:
@@ -205,16 +208,21 @@ def _value(document: Any, path: KeyPath) -> Any:
     return document
 
 
-def _length(limits: Mapping[str, Any], got: Any, about: str) -> str:
-    """The sentence for a list of too few or too many elements, by pydantic's limits."""
+def _length_sentence(limits: Mapping[str, Any], got: Any, about: str) -> str:
+    """The sentence for a list of too few or too many elements, by pydantic's limits; `about` as for
+    `_sentence`."""
     if "max_length" in limits:
         return f"must have at most {limits['max_length']} elements, got {limits['actual_length']}{about}"
     least = limits["min_length"]
     return f"must have at least {least} element{'s' * (least != 1)}, got {limits['actual_length']}{about}"
 
 
-def _literal(expected: str, got: Any, about: str) -> str:
-    """The sentence for a value that is none of the words expected, with the nearest of them."""
+def _literal_sentence(expected: str, got: Any, about: str) -> str:
+    """The sentence for a value that is none of the words expected, with the nearest of them; `about` as for
+    `_sentence`.
+
+    expected  the words as pydantic lists them: 'a', 'b' or 'c'
+    """
     words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
     if isinstance(got, str) and (near := nearest(got, words)):
         return f"must be {expected}, got {quote(got)}; did you mean '{near}'?"

@@ -49,7 +49,8 @@ def mujoco_or_fail(label: str) -> Any:
 
 @contextmanager
 def warnings_of(mujoco: Any, into: list[Finding]) -> Iterator[None]:
-    """Collect what MuJoCo warns of inside the block; it would print it, and write a file beside."""
+    """Collect what MuJoCo warns of inside the block as findings in the list `into`; it would print it, and write a
+    file beside."""
 
     def keep(text: str) -> None:
         into.append(Finding("MuJoCo", " ".join(text.split()), WARNING))
@@ -77,18 +78,18 @@ def compile_mjcf(label: str, parse: Callable[[Any], Any]) -> Compiled:
         try:
             spec = parse(mujoco)
         except (ValueError, OSError) as error:
-            raise fail(label, "", _refused(str(error))) from None
+            raise fail(label, "", _refusal_message(str(error))) from None
         _name_all(spec)
-        _check_meshes(mujoco, spec, label)
+        _refuse_mesh_masses(mujoco, spec, label)
         _leave_meshes_out(mujoco, spec)
         spec.compiler.fusestatic = False
-        findings += _possible_moments(spec, label)
+        findings += _lower_impossible_moments(spec, label)
         made = Compiled(None, spec, findings=findings)
         made.model = _compile(spec, made, label)
     return made
 
 
-def _refused(error: str) -> str:
+def _refusal_message(error: str) -> str:
     """The message, on one line, that MuJoCo cannot read the file, with its reason."""
     text = " ".join(error.split())
     text = re.sub(r"^(XML )?Error: ", "", text)
@@ -98,15 +99,15 @@ def _refused(error: str) -> str:
 def _name_all(spec: Any) -> None:
     """Give every body and joint a name, those of the file staying as they are."""
     taken = {body.name for body in spec.bodies}
-    for number, body in enumerate(spec.bodies):
+    for index, body in enumerate(spec.bodies):
         if not body.name:
-            body.name = _free_name(f"body-{number}", taken)
+            body.name = _free_name(f"body-{index}", taken)
     taken = {joint.name for joint in spec.joints}
     for body in spec.bodies:
-        for place, joint in enumerate(body.joints, start=1):
+        for number, joint in enumerate(body.joints, start=1):
             if not joint.name:
-                alone = len(body.joints) == 1
-                joint.name = _free_name(body.name if alone else f"{body.name}-{place}", taken)
+                only_joint = len(body.joints) == 1
+                joint.name = _free_name(body.name if only_joint else f"{body.name}-{number}", taken)
 
 
 def _free_name(name: str, taken: set[str]) -> str:
@@ -118,19 +119,24 @@ def _free_name(name: str, taken: set[str]) -> str:
     return made
 
 
-def _meshed(mujoco: Any, geom: Any) -> bool:
+def _is_mesh(mujoco: Any, geom: Any) -> bool:
+    """Whether a geometry takes its shape from a file of points: a mesh, a height field or a distance field."""
     return geom.type in [getattr(mujoco.mjtGeom, kind) for kind in MESH_KINDS] or bool(geom.meshname)
 
 
-def _check_meshes(mujoco: Any, spec: Any, label: str) -> None:
-    """Refuse a mass that only a mesh knows: meshes are not read."""
-    always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+def _refuse_mesh_masses(mujoco: Any, spec: Any, label: str) -> None:
+    """Raise DeviceError for bodies that move and whose mass only a mesh knows: meshes are not read."""
+    always_from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     faults = []
-    for body in _moving(spec):
-        if body.explicitinertial and not always:
+    for body in _moving_bodies(spec):
+        if body.explicitinertial and not always_from_geoms:
             continue
-        meshes = [g.meshname for g in body.geoms if _meshed(mujoco, g) and (g.density > 0.0 or g.mass > 0.0)]
-        if meshes and all(np.isnan(g.mass) or g.mass > 0.0 for g in body.geoms):
+        meshes = [
+            geom.meshname
+            for geom in body.geoms
+            if _is_mesh(mujoco, geom) and (geom.density > 0.0 or geom.mass > 0.0)
+        ]
+        if meshes and all(np.isnan(geom.mass) or geom.mass > 0.0 for geom in body.geoms):
             faults.append(
                 Fault(
                     label,
@@ -143,7 +149,7 @@ def _check_meshes(mujoco: Any, spec: Any, label: str) -> None:
         raise DeviceError(faults)
 
 
-def _moving(spec: Any) -> Iterator[Any]:
+def _moving_bodies(spec: Any) -> Iterator[Any]:
     """The bodies that some joint moves; of others no mass is asked."""
     waiting = [(spec.worldbody, False)]
     while waiting:
@@ -157,7 +163,7 @@ def _moving(spec: Any) -> Iterator[Any]:
 def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
     """Replace meshes by small spheres and remove materials of a model, so that no other file is read."""
     for geom in spec.geoms:
-        if _meshed(mujoco, geom) or geom.hfieldname:
+        if _is_mesh(mujoco, geom) or geom.hfieldname:
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, [0.01, 0.01, 0.01]
             geom.meshname, geom.hfieldname, geom.mass = "", "", 0.0
         geom.material = ""
@@ -171,34 +177,34 @@ def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
             delete(element) if delete else element.delete()
 
 
-def _possible_moments(spec: Any, label: str) -> list[Finding]:
-    """Lower a largest moment that is above the sum of the other two to that sum, and tell it; MuJoCo would refuse
-    it. Raises DeviceError for negative ones."""
-    found, faults = [], []
+def _lower_impossible_moments(spec: Any, label: str) -> list[Finding]:
+    """Lower a largest principal moment that is above the sum of the other two to that sum, and return findings
+    that tell it; MuJoCo would refuse it. Raises DeviceError for negative ones."""
+    findings, faults = [], []
     for body in spec.bodies:
         if not body.explicitinertial or spec.compiler.balanceinertia:
             continue
-        full, axes = not np.isnan(body.fullinertia[0]), np.eye(3)
+        has_matrix, axes = not np.isnan(body.fullinertia[0]), np.eye(3)
         moments = np.array(body.inertia)
-        if full:
+        if has_matrix:
             moments, axes = np.linalg.eigh(matrix_of_six(body.fullinertia))
-        place, rest = int(np.argmax(moments)), float(moments.sum() - moments.max())
+        largest, sum_of_others = int(np.argmax(moments)), float(moments.sum() - moments.max())
         listed = ", ".join(f"{moment:.6g}" for moment in sorted(moments))
         where, what = f"body '{body.name}'", f"has the principal moments of inertia {listed} kg m²"
         if moments.min() < -ROUNDED * moments.max():
             faults.append(Fault(label, where, f"{what}; no body has a negative one: correct its inertia"))
-        elif moments[place] > rest:
-            if moments[place] > rest * (1.0 + ROUNDED):
+        elif moments[largest] > sum_of_others:
+            if moments[largest] > sum_of_others * (1.0 + ROUNDED):
                 told = "no body has one above the sum of the other two"
-                found.append(Finding(where, f"{what}; {told}, {rest:.6g}, which is taken", WARNING))
-            moments[place] = rest * (1.0 - 1e-14)
-            if not full:
+                findings.append(Finding(where, f"{what}; {told}, {sum_of_others:.6g}, which is taken", WARNING))
+            moments[largest] = sum_of_others * (1.0 - 1e-14)  # below the sum in MuJoCo's rounding, too
+            if not has_matrix:
                 body.inertia = moments
             else:
                 body.fullinertia = six_of_matrix(axes @ np.diag(moments) @ axes.T)
     if faults:
         raise DeviceError(faults)
-    return found
+    return findings
 
 
 def matrix_of_six(six: Any) -> Any:
@@ -213,12 +219,14 @@ def six_of_matrix(matrix: Any) -> Any:
 
 
 def _compile(spec: Any, made: Compiled, label: str) -> Any:
-    """Compile, giving a mass to bodies that have none and move: MuJoCo wants one."""
+    """Compile to an MjModel, giving a mass to bodies that have none and move, which MuJoCo wants; their names are
+    added to `made`. Raises DeviceError for what MuJoCo refuses."""
     for body in spec.bodies:
         if len(body.joints) and body.explicitinertial and body.mass < LEAST:
-            _weigh(body, made.massless)
+            _give_placeholder_mass(body, made.massless)
         elif len(body.joints) and not body.explicitinertial and not len(body.geoms):
-            _weigh(body, made.unknown)
+            _give_placeholder_mass(body, made.unknown)
+    # MuJoCo names one body without mass at a time, by its number
     for _ in range(len(spec.bodies) + 1):
         try:
             return spec.compile()
@@ -226,14 +234,15 @@ def _compile(spec: Any, made: Compiled, label: str) -> Any:
             named = re.search(r"Element name '(.*)', id (\d+)", str(error))
             if "mass and inertia of moving bodies" in str(error) and named:
                 body = spec.bodies[int(named[2])]
-                _weigh(body, made.massless if body.explicitinertial else made.unknown)
+                _give_placeholder_mass(body, made.massless if body.explicitinertial else made.unknown)
                 continue
-            raise fail(label, "", _refused(str(error))) from None
+            raise fail(label, "", _refusal_message(str(error))) from None
     raise fail(label, "", "has bodies without mass that MuJoCo does not take; give each an <inertial>")
 
 
-def _weigh(body: Any, names: set[str]) -> None:
-    """Give a body a mass, without which MuJoCo does not compile it, and add its name to `names`."""
+def _give_placeholder_mass(body: Any, names: set[str]) -> None:
+    """Give a body a mass of 1 kg, without which MuJoCo does not compile it, and add its name to `names`, by which
+    the mass is left out of the robot."""
     names.add(body.name)
     body.explicitinertial, body.mass, body.inertia = True, 1.0, [1.0, 1.0, 1.0]
     body.fullinertia = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]

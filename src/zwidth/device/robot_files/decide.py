@@ -19,7 +19,15 @@ from zwidth.device.build_mechanism import mechanism as build_mechanism
 from zwidth.device.faults import Fault, comma_list, dotted, fail, suggestion
 from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
-from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
+from zwidth.device.robot_files.links import (
+    LinkTree,
+    Shape,
+    closure_tables,
+    link_tree,
+    merge_universal,
+    moving_bodies,
+    section_of,
+)
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.validation_messages import validation_messages
@@ -27,7 +35,6 @@ from zwidth.errors import DeviceError
 from zwidth.model.handle_position import constraints, handle_goal
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-from zwidth.model.rotations import roll_pitch_yaw_of
 
 HANDLE_WORDS: Final = re.compile(
     r"handle|grip|tool|tcp|eef|end.?effector|attachment|stylus|pen|tip", re.IGNORECASE
@@ -73,27 +80,29 @@ class Decided:
 def decide(robot: Robot, choices: Choices) -> Decided:
     """Make all decisions that a device file needs.
 
+    Joints of several coordinates that are free in part are split, after which all is asked anew.
     Raises DeviceError  with what cannot be decided, or cannot be written
     """
     settle_followers(robot)
-    fixed = _fixed(robot, choices.fixed)
+    fixed = _held_joints(robot, choices.fixed)
     handle = find_handle(robot, choices.handle)
     if handle[0] not in moving_bodies(robot, fixed):
-        raise fail(robot.label, f"'{choices.handle or 'handle'}'", f"does not move; {_handles(robot)}")
+        raise fail(robot.label, f"'{choices.handle or 'handle'}'", f"does not move; {_handle_hint(robot)}")
     if sum(len(body.joints) for body in robot.bodies) > MOST_COORDINATES:
         raise fail(robot.label, "", f"has more than {MOST_COORDINATES} joints, more than a device file is for")
     write_linkages(robot)
-    motors = _motors(robot, fixed)
+    motors = _moving_motors(robot, fixed)
     shape = Shape(fixed=fixed)
     _leave_out_fixed_loops(robot, shape)
     merge_universal(robot, {joint for motor in motors or () for joint in motor.turns} | fixed)
     for _ in range(len(robot.bodies) + 2):
         tree, motions = _draft(robot, shape, handle)
-        _check_loops(robot, motions)
-        driven = motors if motors is not None else _assumed(robot, tree, motions)
+        _refuse_open_loops(robot, motions)
+        driven = motors if motors is not None else _assumed_motors(robot, tree, motions)
+        # of each drive's joint its coordinate, and of these the ones that the loops leave independent
         rows = [motions.rows(tree.link_of[motor.joint])[0] for motor in driven]
         kept = [rows[k] for k in independent(motions.basis, [[row] for row in rows])]
-        changed = _set_free(robot, tree, motions, shape, kept, {motor.joint for motor in driven})
+        changed = _with_free_joints(robot, tree, motions, shape, kept, {motor.joint for motor in driven})
         if changed == shape:
             break
         shape = changed
@@ -103,8 +112,10 @@ def decide(robot: Robot, choices: Choices) -> Decided:
     )
 
 
-def _fixed(robot: Robot, names: Sequence[str]) -> frozenset[str]:
-    """Joints that are held: those named, those of bodies named, and those that follow a held joint."""
+def _held_joints(robot: Robot, names: Sequence[str]) -> frozenset[str]:
+    """Names of the joints that are held: those named, those of bodies named, and those that follow a held joint or
+    that a held follower determines. Followers that are held are removed from the robot. Raises DeviceError for
+    other names."""
     joints, bodies = robot.joints, {body.name: body for body in robot.bodies if body.joints}
     faults, held = [], set()
     for name in names:
@@ -117,20 +128,23 @@ def _fixed(robot: Robot, names: Sequence[str]) -> frozenset[str]:
             faults.append(Fault(robot.label, "fix", f"'{name}' is no joint; {suggestion(name, known, 'joints')}"))
     if faults:
         raise DeviceError(faults)
-    left = list(robot.followers)
-    for _ in range(len(left) + 1):
-        for one in left:
-            if not one.leader or one.leader in held or (one.ratio and one.joint in held):
-                held |= {one.joint, one.leader} - {""}
-    for one in left:
-        if not one.leader:
-            robot.note(one.where, f"holds '{one.joint}' where it stands; it is written as fixed")
-    robot.followers = [one for one in left if one.joint not in held]
+    followers = list(robot.followers)
+    for _ in range(len(followers) + 1):  # one that becomes held may hold others
+        for follower in followers:
+            if not follower.leader or follower.leader in held or (follower.ratio and follower.joint in held):
+                held |= {follower.joint, follower.leader} - {""}
+    for follower in followers:
+        if not follower.leader:
+            robot.note(follower.where, f"holds '{follower.joint}' where it stands; it is written as fixed")
+    robot.followers = [follower for follower in followers if follower.joint not in held]
     return frozenset(held)
 
 
 def find_handle(robot: Robot, name: str | None) -> tuple[int, Place]:
-    """Body and place of the handle. Raises DeviceError where it cannot be told."""
+    """Body index and place in that body of the handle. Raises DeviceError where it cannot be told.
+
+    name  of a site or body; None: the only one called so (`HANDLE_WORDS`), or the only body that carries none
+    """
     sites = {site.name: (site.body, site.place) for site in robot.sites}
     bodies = {body.name: (i, UNMOVED) for i, body in enumerate(robot.bodies) if i != BASE}
     if name is not None:
@@ -140,15 +154,17 @@ def find_handle(robot: Robot, name: str | None) -> tuple[int, Place]:
         raise fail(robot.label, "handle", f"'{name}' is neither a site nor a body of the file; {near}")
     named = [one for one in sites if HANDLE_WORDS.search(one)]
     named = named if len(named) == 1 else [one for one in (*sites, *bodies) if HANDLE_WORDS.search(one)]
-    leaves = [body.name for i, body in enumerate(robot.bodies) if i and all(b.parent != i for b in robot.bodies)]
+    leaves = [
+        body.name for i, body in enumerate(robot.bodies) if i and all(one.parent != i for one in robot.bodies)
+    ]
     found = named if len(named) == 1 else leaves if len(leaves) == 1 else []
     if not found:
-        raise fail(robot.label, "", f"does not say which site or body is the handle; {_handles(robot)}")
+        raise fail(robot.label, "", f"does not say which site or body is the handle; {_handle_hint(robot)}")
     robot.note("mechanism.handle", f"is taken to be '{found[0]}'; name another with handle=NAME")
     return sites.get(found[0]) or bodies[found[0]]
 
 
-def _handles(robot: Robot) -> str:
+def _handle_hint(robot: Robot) -> str:
     """A hint of how to name the handle: the sites and bodies that it may be."""
     sites = [site.name for site in robot.sites]
     bodies = [body.name for body in robot.bodies[1:]][::-1]
@@ -156,8 +172,9 @@ def _handles(robot: Robot) -> str:
     return f"name it with handle=NAME; {listed_sites}bodies: {comma_list(bodies, 8)}"
 
 
-def _motors(robot: Robot, fixed: frozenset[str]) -> list[Motor] | None:
-    """The motors of joints that move; None where the file names none."""
+def _moving_motors(robot: Robot, fixed: frozenset[str]) -> list[Motor] | None:
+    """The motors of a robot without joints that are held; None where the file names no motors. A motor whose own
+    joint is held drives, of the others that turn it, the one with the largest ratio."""
     if robot.motors is None:
         return None
     kept = []
@@ -166,45 +183,21 @@ def _motors(robot: Robot, fixed: frozenset[str]) -> list[Motor] | None:
         if motor.joint in fixed and not turns:
             robot.note(f"actuator '{motor.name}'", "drives a joint that is held; it is left out")
             continue
-        joint = motor.joint if motor.joint not in fixed else max(turns, key=lambda one: abs(turns[one]))
+        joint = motor.joint if motor.joint not in fixed else max(turns, key=lambda name: abs(turns[name]))
         kept.append(replace(motor, joint=joint, turns=turns))
     return kept
 
 
 def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkTree, FreeMotions]:
-    """The tree of links with a shape (which joints are held or split), and the free motions of the mechanism."""
+    """The tree of links with a shape (which joints are held or split), and the motions that the mechanism has if
+    nothing is driven. One drive is put in, without which the table [mechanism] would not be valid."""
     tree = link_tree(robot, shape)
-    single = next((link["name"] for link in tree.links if link["joint"] in ("revolute", "prismatic")), None)
-    if single is None:
+    any_joint = next((link["name"] for link in tree.links if link["joint"] in ("revolute", "prismatic")), None)
+    if any_joint is None:
         raise fail(robot.label, "", "has no joint that turns about one axis or slides, which a drive needs")
     links = [{key: value for key, value in link.items() if key != "free"} for link in tree.links]
-    section = section_of(robot, tree, handle, "pose", [{"name": "drive", "joint": single}]) | {"links": links}
+    section = section_of(robot, tree, handle, "pose", [{"name": "drive", "joint": any_joint}]) | {"links": links}
     return tree, mechanism_motions(section, robot.label)
-
-
-def section_of(
-    robot: Robot, tree: LinkTree, handle: tuple[int, Place], controls: str, drives: list[dict[str, Any]]
-) -> dict[str, Any]:
-    """The table [mechanism] of a device file, without numbers of the reference position."""
-    link, place = tree.in_link(*handle)
-    angles = roll_pitch_yaw_of(place.turn)
-    held: dict[str, Any] = {"link": link, "point_m": listed(place.at)}
-    if angles.any():
-        held["orientation_rad"] = listed(angles)
-    assembly = {"joints_rad": tree.joints_rad, "joints_m": tree.joints_m}
-    section: dict[str, Any] = {"links": tree.links, "loops": closure_tables(robot, tree)}
-    if not section["loops"]:
-        del section["loops"]
-    return section | {
-        "handle": held | {"controls": controls},
-        "assemblies": {"as-imported": {key: value for key, value in assembly.items() if value}},
-        "reference": {
-            "position_m": [0.0, 0.0, 0.0],
-            "orientation_rad": [0.0, 0.0, 0.0],
-            "direction": [1.0, 0.0, 0.0],
-        },
-        "drives": drives,
-    }
 
 
 def _leave_out_fixed_loops(robot: Robot, shape: Shape) -> None:
@@ -217,29 +210,7 @@ def _leave_out_fixed_loops(robot: Robot, shape: Shape) -> None:
             robot.closures.remove(closure)
 
 
-def closure_tables(robot: Robot, tree: LinkTree) -> list[dict[str, Any]]:
-    """The [[mechanism.loops]] of a robot's closures, with points and axes in the frames of the links."""
-    tables, taken = [], LinkTree()
-    for closure in robot.closures:
-        (link_a, frame_a), (link_b, frame_b) = (tree.frames[body] for body in closure.bodies)
-        points = [frame.of_point(point) for frame, point in zip((frame_a, frame_b), closure.points, strict=True)]
-        table: dict[str, Any] = {
-            "name": taken.name(closure.name),
-            "links": [link_a, link_b],
-            "points_m": [listed(point) for point in points],
-        }
-        if closure.closes != "point":
-            table["closes"] = closure.closes
-        if closure.closes == "axis" and closure.axes is not None:
-            axes = (frame.turn @ axis for frame, axis in zip((frame_a, frame_b), closure.axes, strict=True))
-            table["axes"] = [listed(axis) for axis in axes]
-        if closure.closes == "frame" and closure.turn is not None:
-            table["orientation_rad"] = listed(roll_pitch_yaw_of(frame_a.turn @ closure.turn @ frame_b.turn.T))
-        tables.append(table)
-    return tables
-
-
-def _check_loops(robot: Robot, motions: FreeMotions) -> None:
+def _refuse_open_loops(robot: Robot, motions: FreeMotions) -> None:
     """Raise DeviceError for the loops that do not close at the reference posture, with the gap of each [m]."""
     if not motions.open_loops:
         return
@@ -258,9 +229,10 @@ def _check_loops(robot: Robot, motions: FreeMotions) -> None:
     raise DeviceError(faults)
 
 
-def _assumed(robot: Robot, tree: LinkTree, motions: FreeMotions) -> list[Motor]:
-    """Motors of joints taken to be driven where the file names none: as many as motions are free, base first."""
-    followers = {one.joint for one in robot.followers}
+def _assumed_motors(robot: Robot, tree: LinkTree, motions: FreeMotions) -> list[Motor]:
+    """Motors of joints taken to be driven where the file names none: base first, as many as there are independent
+    motions. Joints that follow others are left out."""
+    followers = {follower.joint for follower in robot.followers}
     singles = [
         name
         for name, (_, joint) in robot.joints.items()
@@ -270,27 +242,32 @@ def _assumed(robot: Robot, tree: LinkTree, motions: FreeMotions) -> list[Motor]:
     return [Motor(singles[k], singles[k]) for k in independent(motions.basis, groups)]
 
 
-def _set_free(
+def _with_free_joints(
     robot: Robot, tree: LinkTree, motions: FreeMotions, shape: Shape, driven: list[int], drives: set[str]
 ) -> Shape:
     """The shape with every motion that drives and loops leave given to a free joint.
 
     Where a joint of several coordinates is neither free nor determined as a whole, it is split, and all is asked
     anew.
+    driven  coordinates of the drives, rows of the free motions;   drives  names of the joints that these are
     """
+    # (m, f) motions in which the drives rest; each round gives some of them to one joint, until none is left
     left = left_over(motions.basis, driven)
     free: set[str] = set()
     turned = dict(shape.turned)
-    looped = _looped(robot)
+    looped = _bodies_in_loops(robot)
     joints = {
         name: (body, joint)
         for name, (body, joint) in robot.joints.items()
         if name in tree.link_of and name not in drives
     }
+    # joints, and parts of split ones, in order and each once
     names = {**{name: name for name in joints}, **{name: name for name in tree.link_of if name not in drives}}
     while left.shape[1]:
-        sizes = {name: _size(left, motions.rows(tree.link_of[name])) for name in names if name not in free}
-        whole = [
+        largest = {
+            name: _largest_motion(left, motions.rows(tree.link_of[name])) for name in names if name not in free
+        }
+        free_as_a_whole = [
             name
             for name, (body, joint) in joints.items()
             if name not in free
@@ -298,53 +275,62 @@ def _set_free(
             and body not in looped
             and independent(left, [motions.rows(tree.link_of[name])])
         ]
-        spin = next(
+        spinning = next(
             (name for name in joints if name not in free and _spins(motions, tree, joints, name, left)), None
         )
-        singles = [name for name in sizes if len(motions.rows(tree.link_of[name])) == 1 and sizes[name] > MOVES]
-        if whole:
-            free.add(whole[0])
-            left = left_over(left, motions.rows(tree.link_of[whole[0]]))
-        elif spin:
-            body, rows = joints[spin][0], motions.rows(tree.link_of[spin])
+        singles = [
+            name for name in largest if len(motions.rows(tree.link_of[name])) == 1 and largest[name] > MOVES
+        ]
+        if free_as_a_whole:
+            free.add(free_as_a_whole[0])
+            left = left_over(left, motions.rows(tree.link_of[free_as_a_whole[0]]))
+        elif spinning:
+            body, rows = joints[spinning][0], motions.rows(tree.link_of[spinning])
             axis = _only_direction(left[rows])
-            if body not in turned:
+            if body not in turned:  # the free coordinate of a ball joint is the turn about the link's x axis
                 turned[body] = tuple(map(tuple, _axes_along(axis).tolist()))
-            free.add(spin)
-            left = _without(left, np.asarray(axis @ left[rows]))
+            free.add(spinning)
+            left = _motions_without(left, np.asarray(axis @ left[rows]))
         elif singles:
+            # rather one with a spring, which needs no drive to rest, than one without
             sprung = [name for name in singles if name in joints and joints[name][1].stiffness > 0.0]
-            largest = max(sprung or singles, key=lambda name: sizes[name])
-            free.add(largest)
-            left = left_over(left, motions.rows(tree.link_of[largest]))
+            chosen = max(sprung or singles, key=lambda name: largest[name])
+            free.add(chosen)
+            left = left_over(left, motions.rows(tree.link_of[chosen]))
         else:
-            name = max(sizes, key=lambda name: sizes[name])
+            name = max(largest, key=lambda name: largest[name])
             return replace(shape, split=shape.split | {name})
     return replace(shape, free=frozenset(free), turned=turned)
 
 
-def _size(left: Floats, rows: Sequence[int]) -> float:
+def _largest_motion(left: Floats, rows: Sequence[int]) -> float:
+    """Largest part that coordinates of these rows have in motions `left` (m, f)."""
     return float(np.abs(left[list(rows)]).max(initial=0.0))
 
 
-def _looped(robot: Robot) -> set[int]:
+def _bodies_in_loops(robot: Robot) -> set[int]:
     """Indices of the bodies in loops: those on one only of the ways from a closure's two bodies to the base."""
     found: set[int] = set()
     for closure in robot.closures:
-        one, two = (robot.way_to_base(body) for body in closure.bodies)
-        found |= set(one) ^ set(two)
+        first_way, second_way = (robot.way_to_base(body) for body in closure.bodies)
+        found |= set(first_way) ^ set(second_way)
     return found
 
 
 def _spins(motions: FreeMotions, tree: LinkTree, joints: dict[str, Any], name: str, left: Floats) -> bool:
-    """Whether a ball joint in a loop turns about one axis of its body while all joints of one coordinate rest."""
+    """Whether a ball joint in a loop turns about one axis of its body while all joints of one coordinate rest.
+
+    joints  name -> body index and joint;   left  (m, f) motions in which the drives rest
+    """
     if joints[name][1].kind != "spherical" or name not in tree.link_of:
         return False
+    # rows of all joints of one coordinate
     resting = [row for row, entry in enumerate(motions.entries) if len(motions.rows(entry.partition("/")[0])) == 1]
     turning = left_over(left, resting)
     if not turning.shape[1]:
         return False
     values = np.linalg.svd(turning[motions.rows(tree.link_of[name])], compute_uv=False)
+    # the second is 0: all turns that remain are about one axis
     return bool(values[0] > MOVES and (len(values) == 1 or values[1] <= MOVES * values[0]))
 
 
@@ -353,14 +339,15 @@ def _only_direction(rows: Floats) -> Floats:
     return np.asarray(np.linalg.svd(rows)[0][:, 0])
 
 
-def _without(left: Floats, row: Floats) -> Floats:
+def _motions_without(left: Floats, row: Floats) -> Floats:
     """The motions (m, f - 1), of `left` (m, f), in which their combination `row` (f,) is 0."""
-    _, _, right = np.linalg.svd(row[None])
-    return np.asarray(left @ right[1:].T)
+    _, _, right_vectors = np.linalg.svd(row[None])
+    return np.asarray(left @ right_vectors[1:].T)
 
 
 def _axes_along(axis: Floats) -> Floats:
-    """Rotation (3, 3) whose first column is along an axis, its largest component made positive."""
+    """Rotation (3, 3) whose first column is along an axis, in the sense that makes its largest component
+    positive."""
     x = axis if axis[np.argmax(np.abs(axis))] > 0.0 else -axis
     x = np.where(np.abs(x) < 1e-12, 0.0, x)
     x = x / np.linalg.norm(x)
@@ -379,32 +366,38 @@ def _controls(
     shape: Shape,
     wanted: str | None,
 ) -> tuple[str, Floats]:
-    """What the drives control of the handle (position, ...), and its motions (6, d) by them at reference."""
+    """What the drives control of the handle, "position", "orientation" or "pose", and the handle's motions (6, d)
+    by them at the reference posture. Raises DeviceError where the handle does not tell the motions of all drives.
+
+    driven  motors;   kept  their coordinates, as far as these are independent
+    wanted  what the user says they control; None: the least that tells them
+    """
     if not kept:
-        raise fail(robot.label, "", _nothing_moves(robot, motions))
+        raise fail(robot.label, "", _nothing_moves_message(robot, motions))
     free = [row for name in sorted(shape.free) for row in _free_rows(robot, tree, motions, name)]
-    each = [free_handle_motions(place, kept, free) for place in motions.places]
-    found = [controls for H in each if (controls := controls_of(H))]
+    # (6, d) at each of several postures: that of the file may be singular
+    handle_motions = [free_handle_motions(place, kept, free) for place in motions.places]
+    found = [controls for H in handle_motions if (controls := controls_of(H))]
     if not found:
-        raise fail(robot.label, "", _not_controlled(motions, tree, driven, kept, each))
+        raise fail(robot.label, "", _not_controlled_message(motions, tree, driven, kept, handle_motions))
     controls = min(found, key=("position", "orientation", "pose").index)
     parts = {"position": slice(0, 3), "orientation": slice(3, 6), "pose": slice(0, 6)}
     if wanted is not None:
-        if not any(controlled(H[parts[wanted]]) for H in each):
+        if not any(controlled(H[parts[wanted]]) for H in handle_motions):
             raise fail(
                 robot.label, "controls", f"cannot be {wanted}: it leaves drives open; it can be {controls} or pose"
             )
         controls = wanted
-    if not controlled(each[0][parts[controls]]):
+    if not controlled(handle_motions[0][parts[controls]]):
         robot.warn(
             "mechanism.reference",
             "the posture of the file is singular: its drives cannot move the handle every way. Give another with "
             "posture=JOINT=VALUE or keyframe=NAME",
         )
-    return controls, each[0]
+    return controls, handle_motions[0]
 
 
-def _nothing_moves(robot: Robot, motions: FreeMotions) -> str:
+def _nothing_moves_message(robot: Robot, motions: FreeMotions) -> str:
     """The message for drives that move no joint, or for loops that leave no freedom."""
     if motions.basis.shape[1]:
         return "drives no joint that moves; name a motor for each degree of freedom"
@@ -416,28 +409,33 @@ def _nothing_moves(robot: Robot, motions: FreeMotions) -> str:
 
 
 def _free_rows(robot: Robot, tree: LinkTree, motions: FreeMotions, name: str) -> list[int]:
-    """Coordinates of a joint that count as free; of a ball joint between the ends of a loop only the first."""
+    """Coordinates of a free joint, as rows of the motions; of a ball joint in a loop only the first, the turn
+    about x."""
     rows = motions.rows(tree.link_of[name])
     found = robot.joints.get(name)
-    spins = found is not None and found[1].kind == "spherical" and found[0] in _looped(robot)
+    spins = found is not None and found[1].kind == "spherical" and found[0] in _bodies_in_loops(robot)
     return rows[:1] if spins else rows
 
 
-def _not_controlled(
-    motions: FreeMotions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
+def _not_controlled_message(
+    motions: FreeMotions, tree: LinkTree, driven: list[Motor], kept: list[int], handle_motions: list[Floats]
 ) -> str:
-    """The sentence for drives whose motions the handle does not tell: which of them do not move it, or how many
-    are too many. kept: their coordinates; each: motions of the handle (6, d) at several postures."""
-    names = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
-    resting = set.intersection(*(set(idle_drives(H)) for H in each))
-    idle = [names[kept[k]].joint for k in sorted(resting)]
+    """The message for drives whose motions the handle does not tell: which of them do not move it, or how many are
+    too many.
+
+    kept            coordinates of the drives that are independent, rows of the motions
+    handle_motions  (6, d) motions of the handle by these, at several postures
+    """
+    motors = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
+    resting = set.intersection(*(set(idle_drives(H)) for H in handle_motions))
+    idle = [motors[kept[drive]].joint for drive in sorted(resting)]
     if idle:
         return (
             f"drives {comma_list(idle, 12)}, which do not move the handle; hold them still with "
             f"fix={','.join(idle[:12])}, or name another handle with handle=NAME"
         )
-    rank = max(int(np.linalg.matrix_rank(H, tol=1e-6 * max(np.abs(H).max(), 1e-300))) for H in each)
-    joints = [names[row].joint for row in kept]
+    rank = max(int(np.linalg.matrix_rank(H, tol=1e-6 * max(np.abs(H).max(), 1e-300))) for H in handle_motions)
+    joints = [motors[row].joint for row in kept]
     return (
         f"has {len(kept)} drives, {comma_list(joints, 12)}, that move the handle in {rank} ways: a posture is "
         f"asked by the handle, which must tell all of them. Hold {len(kept) - rank} of them still with "
@@ -451,7 +449,8 @@ NEGLIGIBLE: Final = 1e-9  # share of a handle's largest motion, below which a jo
 
 @dataclass(frozen=True)
 class Configuration:
-    """The motions of a mechanism where it stands with its loops closed.
+    """The motions of a mechanism where it stands with its loops closed, m coordinates in the order of
+    `MechanismArrays.joint`.
 
     basis    (m, f) what the loops leave, scaled to [rad] and sizes of the mechanism
     handle   (6, m) motions of the handle by each coordinate: its position, then its turning, scaled alike
@@ -486,9 +485,12 @@ class FreeMotions:
         return min((place.basis for place in self.places), key=lambda basis: basis.shape[1])
 
     def rows(self, link: str) -> list[int]:
-        """Indices of the joint coordinates of a link's joint."""
+        """Indices of the joint coordinates of a link's joint, in their order within the joint."""
+        # at most six coordinates, of which the last is named as the link
         own = {link, *(f"{link}/{k}" for k in range(1, 6))}
-        return sorted((u for u, name in enumerate(self.entries) if name in own), key=lambda u: self.order[u])
+        return sorted(
+            (row for row, name in enumerate(self.entries) if name in own), key=lambda row: self.order[row]
+        )
 
     @property
     def order(self) -> list[int]:
@@ -506,6 +508,7 @@ def mechanism_motions(section: dict[str, Any], label: str) -> FreeMotions:
     """The motions of a draft of [mechanism] whose handle is given by its pose, whichever joints the draft says are
     driven or free.
 
+    section  the table [mechanism];   label  the robot's file, for messages
     Raises DeviceError  for numbers that a device file does not allow
     """
     try:
@@ -529,16 +532,18 @@ def mechanism_motions(section: dict[str, Any], label: str) -> FreeMotions:
 def _configuration(mech: MechanismArrays, angles: Floats) -> Configuration:
     """The `Configuration` at joint coordinates (n,) that close all loops."""
     loops = int(mech.first_row[-1])
+    # derivative by each coordinate (m, r): of the loops' equations, `loops` in all, then of the handle's six
     rows = constraints(mech, 0, angles, np.zeros(6))[0] * mech.unit[0][:, None]
     return Configuration(null_space(rows[:, :loops].T), np.asarray(rows[:, loops : loops + 6].T))
 
 
 def independent(basis: Floats, groups: Iterable[Sequence[int]], kept: Sequence[int] = ()) -> list[int]:
-    """Indices of groups of rows of `basis` (m, f) that are independent of `kept` rows and earlier groups."""
+    """Indices of the groups of coordinates, rows of the free motions `basis` (m, f), that can move independently
+    of the coordinates `kept` and of all groups chosen before."""
     chosen, rows = [], list(kept)
-    for k, group in enumerate(groups):
+    for index, group in enumerate(groups):
         if _rank(basis[[*rows, *group]]) == len(rows) + len(group):
-            chosen.append(k)
+            chosen.append(index)
             rows += group
     return chosen
 
@@ -553,20 +558,23 @@ def left_over(basis: Floats, rows: Sequence[int]) -> Floats:
 
 
 def _rank(rows: Floats) -> int:
+    """Number of independent rows of free motions (k, f), by their singular values."""
     values = np.linalg.svd(rows, compute_uv=False)
     return int(np.sum(values > INDEPENDENT * max(values[0], np.finfo(float).tiny))) if values.size else 0
 
 
 def free_handle_motions(place: Configuration, driven: Sequence[int], free: Sequence[int]) -> Floats:
-    """Motions of the handle by each driven coordinate while the free ones rest, (6, d)."""
+    """Motions of the handle by each driven coordinate while the other driven and the free ones rest, (6, d);
+    driven and free coordinates as rows of `place.basis`."""
     rows = [*driven, *free]
+    # (f, d + free) combinations of the free motions in which one of these coordinates moves and the others rest
     rates = np.linalg.lstsq(place.basis[rows], np.eye(len(rows)), rcond=None)[0]
     return np.asarray(place.handle @ place.basis @ rates)[:, : len(driven)]
 
 
 def controls_of(H: Floats) -> str | None:
     """The least of the handle whose motions tell those of all drives: "position", "orientation" or "pose"; None:
-    some drive moves while the handle rests."""
+    some drive moves while the handle rests. H (6, d): motions by each drive, of the position, then the turning."""
     for controls, part in (("position", H[:3]), ("orientation", H[3:]), ("pose", H)):
         if controlled(part):
             return controls
@@ -574,7 +582,8 @@ def controls_of(H: Floats) -> str | None:
 
 
 def controlled(part: Floats) -> bool:
-    """Whether motions of the handle (r, d) tell those of all drives."""
+    """Whether motions of the handle by d drives, (r, d), tell how each of the drives moves: whether they are
+    independent."""
     values = np.linalg.svd(part, compute_uv=False)
     return len(values) == part.shape[1] and bool(values[-1] > REGULAR * max(values[0], np.finfo(float).tiny))
 

@@ -41,7 +41,7 @@ ALIGNED: Final = 1e-9  # sine of the angle between axes that count as parallel, 
 
 def settle_followers(robot: Robot) -> None:
     """Set the coordinate of every joint that follows another to what its leader's coordinate asks for."""
-    for _ in robot.followers:
+    for _ in robot.followers:  # leaders may follow others themselves
         for one in robot.followers:
             joints = robot.joints
             if one.joint not in joints:
@@ -58,26 +58,32 @@ def write_linkages(robot: Robot) -> None:
 
     Raises DeviceError  for followers that no linkage stands for
     """
-    faults = [Fault(robot.label, one.where, _refusal(one)) for one in robot.followers if not _linked(robot, one)]
+    faults = [
+        Fault(robot.label, one.where, _refusal_message(one))
+        for one in robot.followers
+        if not _add_linkage(robot, one)
+    ]
     if faults:
         raise DeviceError(faults)
     robot.motors = None if robot.motors is None else [_on_leader(robot, motor) for motor in robot.motors]
 
 
-def _refusal(one: Follower) -> str:
+def _refusal_message(follower: Follower) -> str:
     """The message for a follower that no linkage can hold."""
-    curve = "" if one.linear else " and a curve"
+    curve = "" if follower.linear else " and a curve"
     return (
-        f"lets '{one.joint}' follow '{one.leader}' by the ratio {one.ratio:.6g}{curve}, which a device file "
-        f"cannot hold; hold both still with fix={one.joint}, or write the linkage between them as a loop"
+        f"lets '{follower.joint}' follow '{follower.leader}' by the ratio {follower.ratio:.6g}{curve}, which a "
+        f"device file cannot hold; hold both still with fix={follower.joint}, or write the linkage between them "
+        "as a loop"
     )
 
 
 def _on_leader(robot: Robot, motor: Motor) -> Motor:
-    """The motor with turns expressed by joints that follow no other, in place of those that do."""
+    """The motor with turns expressed by joints that follow no other, in place of those that do; its turns of its
+    own joint are made positive, as a drive's ratio is."""
     leaders = {one.joint: (one.leader, one.ratio) for one in robot.followers}
     turns, joint = dict(motor.turns), motor.joint
-    for _ in leaders:
+    for _ in leaders:  # a leader may follow another joint
         for name in [name for name in turns if name in leaders]:
             leader, ratio = leaders[name]
             turns[leader] = turns.get(leader, 0.0) + ratio * turns.pop(name)
@@ -86,30 +92,38 @@ def _on_leader(robot: Robot, motor: Motor) -> Motor:
     return replace(motor, joint=joint, turns={name: sign * turn for name, turn in turns.items() if turn})
 
 
-def _linked(robot: Robot, one: Follower) -> bool:
-    """Add the linkage of a follower. Returns False where there is none."""
+def _add_linkage(robot: Robot, follower: Follower) -> bool:
+    """Add the linkage of a follower to the robot. Returns False where no linkage stands for it."""
     joints = robot.joints
-    if not one.linear or one.ratio == 0.0 or one.leader not in joints or one.joint not in joints:
+    if (
+        not follower.linear
+        or follower.ratio == 0.0
+        or follower.leader not in joints
+        or follower.joint not in joints
+    ):
         return False
-    (l, leader), (f, follower) = joints[one.leader], joints[one.joint]
-    if len(robot.bodies[l].joints) != 1 or len(robot.bodies[f].joints) != 1:
+    (leader_body, leader), (follower_body, led) = joints[follower.leader], joints[follower.joint]
+    if len(robot.bodies[leader_body].joints) != 1 or len(robot.bodies[follower_body].joints) != 1:
         return False
-    if leader.kind == follower.kind == "prismatic":
-        linked = _slide_together(robot, one, l, f)
-    elif leader.kind == follower.kind == "revolute":
-        linked = _turn_together(robot, one, l, f)
+    if leader.kind == led.kind == "prismatic":
+        linked = _slide_together(robot, follower, leader_body, follower_body)
+    elif leader.kind == led.kind == "revolute":
+        linked = _turn_together(robot, follower, leader_body, follower_body)
     else:
         linked = False
     if linked:
         robot.note(
-            one.where, f"lets '{one.joint}' follow '{one.leader}': links without mass and loops hold it exactly"
+            follower.where,
+            f"lets '{follower.joint}' follow '{follower.leader}': links without mass and loops hold it exactly",
         )
     return linked
 
 
-def _anchored(robot: Robot, body: int) -> tuple[int, Place]:
-    """The body that carries a body by fixed connections alone, the nearest to the base, and the place of the
-    latter in it."""
+def _moving_carrier(robot: Robot, body: int) -> tuple[int, Place]:
+    """Follow fixed connections from a body towards the base.
+
+    Returns the first body there that has a joint, or BASE, and the place in it of the body asked about
+    """
     place = UNMOVED
     while body != BASE and not robot.bodies[body].joints:
         place = robot.bodies[body].place @ place
@@ -118,34 +132,48 @@ def _anchored(robot: Robot, body: int) -> tuple[int, Place]:
 
 
 def _carrier(robot: Robot, body: int) -> tuple[int, Place]:
-    """The body against which a body's joint moves, and the place of the latter in it with the joint at 0."""
-    carrier, place = _anchored(robot, robot.bodies[body].parent)
+    """The body against which a body's joint moves, and the place in it of the body asked about with its joint at
+    0."""
+    carrier, place = _moving_carrier(robot, robot.bodies[body].parent)
     return carrier, place @ robot.bodies[body].place
 
 
-def _slide_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
-    """Make the slide of body `f` follow that of body `l` by massless wedges; False if they slide on two bodies."""
-    (on, of_leader), (same, of_follower) = _carrier(robot, l), _carrier(robot, f)
-    if on != same:
+def _slide_together(robot: Robot, follower: Follower, leader_body: int, follower_body: int) -> bool:
+    """Make the slide of body `follower_body` follow that of `leader_body` by massless wedges, in the symbols of
+    this file's head. Returns False if the two slide on different bodies."""
+    (carrier, of_leader), (other_carrier, of_follower) = (
+        _carrier(robot, leader_body),
+        _carrier(robot, follower_body),
+    )
+    if carrier != other_carrier:
         return False
-    a = of_leader.turn @ robot.joints[one.leader][1].axis
-    b = of_follower.turn @ robot.joints[one.joint][1].axis
-    name, way = f"{one.joint}-wedge", float(robot.joints[one.leader][1].value)
-    started = Place(of_follower.turn, of_follower.at + one.offset * b)  # with its leader at 0
+    # axes of leader and follower in the frame of the body that carries both
+    a = of_leader.turn @ robot.joints[follower.leader][1].axis
+    b = of_follower.turn @ robot.joints[follower.joint][1].axis
+    name, q = f"{follower.joint}-wedge", float(robot.joints[follower.leader][1].value)
+    started = Place(of_follower.turn, of_follower.at + follower.offset * b)  # with its leader at 0
     if np.linalg.norm(np.cross(a, b)) > OBLIQUE:
-        _wedge(robot, name, (l, of_leader), (f, started), one.ratio * b - a, way)
+        _wedge(robot, name, (leader_body, of_leader), (follower_body, started), follower.ratio * b - a, q)
         return True
-    c = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
-    c /= np.linalg.norm(c)
-    slide = Place(np.eye(3), started.at)
-    between = _slide(robot, f"{one.joint}-across", on, slide, c, way), slide
-    _wedge(robot, f"{name}-1", (l, of_leader), between, c - a, way)
-    _wedge(robot, f"{name}-2", (f, started), between, c - one.ratio * b, way)
+    across = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
+    across /= np.linalg.norm(across)
+    # the third slide moves along `across` by q: one wedge is on the leader, at q a, one on the follower, at q r b
+    start = Place(np.eye(3), started.at)
+    between = _slide(robot, f"{follower.joint}-across", carrier, start, across, q), start
+    _wedge(robot, f"{name}-1", (leader_body, of_leader), between, across - a, q)
+    _wedge(robot, f"{name}-2", (follower_body, started), between, across - follower.ratio * b, q)
     return True
 
 
 def _slide(robot: Robot, name: str, on: int, place: Place, direction: Floats, way: float = 0.0) -> int:
-    """Add a massless body that slides on body `on` by `way` lengths of the direction; returns its index."""
+    """Add a massless body that slides on another.
+
+    on         index of the body that it slides on
+    place      of the new body in that body's frame, at coordinate 0
+    direction  (3,) of any length, in the frame of body `on`
+    way        where it stands at first, in lengths of the direction
+    Returns the index of the new body
+    """
     length = float(np.linalg.norm(direction))
     axis = place.turn.T @ direction / length
     joint = RobotJoint(name, "prismatic", axis, np.zeros(3), way * length)
@@ -154,55 +182,84 @@ def _slide(robot: Robot, name: str, on: int, place: Place, direction: Floats, wa
 
 
 def _wedge(
-    robot: Robot, name: str, on: tuple[int, Place], to: tuple[int, Place], direction: Floats, way: float
+    robot: Robot,
+    name: str,
+    carried_by: tuple[int, Place],
+    pinned_to: tuple[int, Place],
+    direction: Floats,
+    way: float,
 ) -> None:
-    """Add a massless body that slides on body `on` along a direction, and that a loop pins to body `to`."""
-    carrying, place = on
-    wedge = _slide(robot, name, carrying, UNMOVED, place.turn.T @ direction, way)
-    met = to[1].inverse.of_point(place.at)
-    robot.closures.append(RobotClosure(name, (wedge, to[0]), np.stack([np.zeros(3), met])))
+    """Add a massless body that slides on one body along a direction, and that a loop pins to another.
+
+    carried_by, pinned_to  index of each body and its place with its joint at 0, both in one frame
+    direction              (3,) in that frame;   way  where the wedge stands at first, in lengths of the direction
+    """
+    carrier, place = carried_by
+    wedge = _slide(robot, name, carrier, UNMOVED, place.turn.T @ direction, way)
+    pin = pinned_to[1].inverse.of_point(place.at)
+    robot.closures.append(RobotClosure(name, (wedge, pinned_to[0]), np.stack([np.zeros(3), pin])))
 
 
-def _turn_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
-    """Make the joint of body `f` turn with that of body `l`, where a linkage that keeps an orientation does it:
-    parallel axes, and the ratio 1 on one body or -1 (one body carries the other). Returns False elsewhere."""
-    (under_leader, of_leader), (under_follower, of_follower) = _carrier(robot, l), _carrier(robot, f)
-    leader, follower = robot.joints[one.leader][1], robot.joints[one.joint][1]
-    u, v = of_leader.turn @ leader.axis, of_follower.turn @ follower.axis
+def _turn_together(robot: Robot, follower: Follower, leader_body: int, follower_body: int) -> bool:
+    """Make the joint of body `follower_body` turn with that of `leader_body`, where a linkage that keeps an
+    orientation does it: about parallel axes, by the ratio 1 on one body, or -1 where one of the two carries the
+    other. Returns False elsewhere."""
+    (under_leader, of_leader), (under_follower, of_follower) = (
+        _carrier(robot, leader_body),
+        _carrier(robot, follower_body),
+    )
+    leader, led = robot.joints[follower.leader][1], robot.joints[follower.joint][1]
+    leader_axis, follower_axis = of_leader.turn @ leader.axis, of_follower.turn @ led.axis
+    # keeps, kept: index and place of two bodies that must not turn against each other; wanted: the ratio for it,
+    # about axes of one sense
     if under_leader == under_follower:
         at_leader, at_follower = (
-            place @ joint_motion(joint, joint.value)
-            for place, joint in ((of_leader, leader), (of_follower, follower))
+            place @ joint_motion(joint, joint.value) for place, joint in ((of_leader, leader), (of_follower, led))
         )
-        keeps, kept, wanted, u = (l, at_leader), (f, at_follower), 1.0, u
-    elif under_follower == l:
-        behind = (
-            of_leader @ joint_motion(leader, leader.value) @ of_follower @ joint_motion(follower, follower.value)
+        keeps, kept, wanted, leader_axis = (leader_body, at_leader), (follower_body, at_follower), 1.0, leader_axis
+    elif under_follower == leader_body:
+        behind = of_leader @ joint_motion(leader, leader.value) @ of_follower @ joint_motion(led, led.value)
+        keeps, kept, wanted, follower_axis = (
+            (under_leader, UNMOVED),
+            (follower_body, behind),
+            -1.0,
+            of_leader.turn @ follower_axis,
         )
-        keeps, kept, wanted, v = (under_leader, UNMOVED), (f, behind), -1.0, of_leader.turn @ v
-    elif under_leader == f:
-        behind = (
-            of_follower @ joint_motion(follower, follower.value) @ of_leader @ joint_motion(leader, leader.value)
+    elif under_leader == follower_body:
+        behind = of_follower @ joint_motion(led, led.value) @ of_leader @ joint_motion(leader, leader.value)
+        keeps, kept, wanted, leader_axis = (
+            (under_follower, UNMOVED),
+            (leader_body, behind),
+            -1.0,
+            of_follower.turn @ leader_axis,
         )
-        keeps, kept, wanted, u = (under_follower, UNMOVED), (l, behind), -1.0, of_follower.turn @ u
     else:
         return False
-    along = float(u @ v)
-    if np.linalg.norm(np.cross(u, v)) > ALIGNED or abs(along * one.ratio - wanted) > ALIGNED:
+    # 1 or -1 by the sense of the axes, if these are parallel
+    cosine = float(leader_axis @ follower_axis)
+    if (
+        np.linalg.norm(np.cross(leader_axis, follower_axis)) > ALIGNED
+        or abs(cosine * follower.ratio - wanted) > ALIGNED
+    ):
         return False
-    _keep_orientation(robot, f"{one.joint}-parallel", keeps, kept, u)
+    _keep_orientation(robot, f"{follower.joint}-parallel", keeps, kept, leader_axis)
     return True
 
 
 def _keep_orientation(
     robot: Robot, name: str, keeps: tuple[int, Place], kept: tuple[int, Place], axis: Floats
 ) -> None:
-    """Add massless slides and a loop by which body `kept` moves across an axis against body `keeps` but does not
-    turn; both places are in one frame."""
+    """Add two massless slides and a loop by which body `kept` moves across an axis against body `keeps` but does
+    not turn.
+
+    keeps, kept  index of each body and its place, both in one frame
+    axis         (3,) unit vector in that frame, at right angles to both slides
+    """
     relative = keeps[1].inverse @ kept[1]
-    u = keeps[1].turn.T @ axis
-    e = np.cross(u, np.eye(3)[int(np.argmin(np.abs(u)))])
-    e /= np.linalg.norm(e)
-    first = _slide(robot, f"{name}-1", keeps[0], Place(np.eye(3), relative.at), e)
-    second = _slide(robot, f"{name}-2", first, UNMOVED, np.cross(u, e))
+    # in the frame of body `keeps`
+    axis_here = keeps[1].turn.T @ axis
+    across = np.cross(axis_here, np.eye(3)[int(np.argmin(np.abs(axis_here)))])
+    across /= np.linalg.norm(across)
+    first = _slide(robot, f"{name}-1", keeps[0], Place(np.eye(3), relative.at), across)
+    second = _slide(robot, f"{name}-2", first, UNMOVED, np.cross(axis_here, across))
     robot.closures.append(RobotClosure(name, (second, kept[0]), np.zeros((2, 3)), "frame", turn=relative.turn))

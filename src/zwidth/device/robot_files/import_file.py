@@ -27,8 +27,8 @@ from zwidth.device.load import from_document
 from zwidth.device.plausibility import implausible, unknown_numbers
 from zwidth.device.read import LARGEST_FILE, parse_document, read_text
 from zwidth.device.robot_files.compile_mjcf import compile_mjcf, mjcf_file, mujoco_or_fail
-from zwidth.device.robot_files.decide import Choices, Decided, decide, section_of
-from zwidth.device.robot_files.links import LinkTree, listed
+from zwidth.device.robot_files.decide import Choices, Decided, decide
+from zwidth.device.robot_files.links import LinkTree, listed, section_of
 from zwidth.device.robot_files.read_actuators import read_actuators, read_equalities, read_the_rest
 from zwidth.device.robot_files.read_model import read_bodies, read_urdf
 from zwidth.device.robot_files.robot import BASE, WARNING, Finding, Motor, Robot, RobotClosure
@@ -93,22 +93,25 @@ def import_file(
     else:
         included_files(root, Path(path).parent, label)
         robot = _read_mjcf(Path(path), root.get("model") or Path(path).stem, label, keyframe)
-    _put_joints(robot, posture or {})
+    _set_posture(robot, posture or {})
     decided = decide(robot, Choices(handle, controls, tuple(fix)))
     _tell_of_decisions(robot, decided)
     document = document_of(robot, decided, f"imported from {Path(label).name}")
-    device = _checked(document, label)
+    device = _checked_device(document, label)
     robot.findings += [Finding(fault.key, fault.message, WARNING) for fault in implausible(device)]
     unknown = unknown_numbers(document)
     for entry in unknown:
         robot.note(entry.group, f"is not in the file; {entry.needed_for}")
-    findings = merged_tables(robot.findings)
+    findings = merged_findings(robot.findings)
     return ImportedDevice(
-        document, robot_device_text(document, findings), findings, [k for e in unknown for k in e.paths]
+        document,
+        robot_device_text(document, findings),
+        findings,
+        [key for entry in unknown for key in entry.paths],
     )
 
 
-def merged_tables(findings: Sequence[Finding]) -> list[Finding]:
+def merged_findings(findings: Sequence[Finding]) -> list[Finding]:
     """The findings with those that say the same of several places made one; warnings first."""
     places: dict[tuple[str, str], list[str]] = {}
     for one in findings:
@@ -119,8 +122,9 @@ def merged_tables(findings: Sequence[Finding]) -> list[Finding]:
     return sorted(made, key=lambda one: one.severity != WARNING)
 
 
-def _put_joints(robot: Robot, posture: Mapping[str, float]) -> None:
-    """Set coordinates of joints of one coordinate [rad] or [m], by name. Raises DeviceError for other names."""
+def _set_posture(robot: Robot, posture: Mapping[str, float]) -> None:
+    """Set in the robot the coordinates [rad] or [m] of joints by name, as the file counts them: a joint's own
+    count begins at its `rest`. Raises DeviceError for names of no joint of one coordinate."""
     singles = {name for name, (_, joint) in robot.joints.items() if joint.single}
     faults = [
         Fault(
@@ -142,7 +146,10 @@ def _put_joints(robot: Robot, posture: Mapping[str, float]) -> None:
 
 
 def _read_mjcf(path: Path, name: str, label: str, keyframe: str | None) -> Robot:
-    """The robot of an MJCF file, in the posture of a keyframe where one is named. Raises DeviceError."""
+    """The robot of an MJCF file, in the posture of a keyframe where one is named. Raises DeviceError.
+
+    name  what to call the robot;   label  what messages call the file
+    """
     compiled = compile_mjcf(label, mjcf_file(path))
     mujoco = mujoco_or_fail(label)
     robot = read_bodies(compiled, name, label, keyframe)
@@ -172,8 +179,9 @@ def _tell_of_decisions(robot: Robot, decided: Any) -> None:
                 )
 
 
-def _checked(document: dict[str, Any], label: str) -> Any:
-    """The device of the document. Raises DeviceError in the words of the robot's file."""
+def _checked_device(document: dict[str, Any], label: str) -> Any:
+    """The device of the document. Raises DeviceError whose faults name the robot's file, `label`, and keys as
+    "imported KEY"."""
     try:
         return from_document(document, label)
     except DeviceError as error:
@@ -300,7 +308,11 @@ def add_loops(robot: Robot, path: Path) -> None:
 
 
 def _closure(loop: LoopClosure, order: dict[str, int]) -> RobotClosure:
-    """A loop closure of a device file as one of a robot; `order`: index of each body by name."""
+    """A loop closure of a loop file as one of a robot, points and axes left out being the links' origins and z
+    axes.
+
+    order  index of each body by name
+    """
     points: Any = loop.points_m or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     axes = np.array(loop.axes or ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), dtype=np.float64)
     return RobotClosure(
@@ -321,7 +333,8 @@ def document_of(robot: Robot, decided: Decided, source: str) -> dict[str, Any]:
     names = LinkTree()
     drives = _drives(robot, decided, names)
     section = section_of(robot, decided.tree, decided.handle, decided.controls, drives)
-    _close(robot, decided, section)
+    _write_closed_posture(robot, decided, section)
+    # goal: position, then rotation vector, of the handle
     goal, reference = decided.motions.goal, section["reference"]
     reference["position_m"] = listed(goal[:3])
     reference["orientation_rad"] = listed(roll_pitch_yaw_of(rotation_matrix(goal[3:])))
@@ -334,10 +347,13 @@ def document_of(robot: Robot, decided: Decided, source: str) -> dict[str, Any]:
 
 
 def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, Any]]:
-    """The drives; rotor and ratio are given for all of them or for none."""
+    """The tables [[mechanism.drives]]; rotor and ratio are given for all of them or for none.
+
+    names  which hands out the drives' names, each once
+    """
     motors, tree = decided.motors, decided.tree
     ratios = all(motor.turns for motor in motors)
-    inertias = [_rotor(robot, motor) for motor in motors]
+    inertias = [_rotor_inertia(robot, motor) for motor in motors]
     rotors = ratios and any(inertias)
     tables = []
     for motor, inertia in zip(motors, inertias, strict=True):
@@ -353,7 +369,7 @@ def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, A
         if ratios and len(motor.turns) > 1:
             others = {joint: turns for joint, turns in motor.turns.items() if joint != motor.joint}
             table["coupling"] = {tree.link_of[joint]: turns for joint, turns in others.items()}
-        torque = _torque(robot, motor)
+        torque = _motor_torque(robot, motor)
         if torque is not None and ratios:
             table["torque_limit_Nm"] = torque
         tables.append(table)
@@ -361,18 +377,22 @@ def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, A
     return tables
 
 
-def _rotor(robot: Robot, motor: Motor) -> float:
+def _rotor_inertia(robot: Robot, motor: Motor) -> float:
     """Inertia of the rotor at the motor [kg m²]: its own, and, if it drives one joint, over the square of the
     ratio the armature of this joint and of those that follow it."""
     own = float(motor.inertia or 0.0)
     if len(motor.turns) != 1:
         return own
     joints = robot.joints
-    led = sum(one.ratio**2 * joints[one.joint][1].armature for one in robot.followers if one.leader == motor.joint)
-    return float(own + (joints[motor.joint][1].armature + led) / motor.turns[motor.joint] ** 2)
+    of_followers = sum(
+        follower.ratio**2 * joints[follower.joint][1].armature
+        for follower in robot.followers
+        if follower.leader == motor.joint
+    )
+    return float(own + (joints[motor.joint][1].armature + of_followers) / motor.turns[motor.joint] ** 2)
 
 
-def _torque(robot: Robot, motor: Motor) -> float | None:
+def _motor_torque(robot: Robot, motor: Motor) -> float | None:
     """Largest torque of a motor [N m]: its own, or from the effort of its joint; None if not known."""
     if motor.torque is not None or not motor.turns:
         return motor.torque
@@ -381,20 +401,24 @@ def _torque(robot: Robot, motor: Motor) -> float | None:
 
 
 def _tell_of_armature(robot: Robot, decided: Decided) -> None:
-    """Armature of joints that no motor has for itself: a device file has rotors, not joints with inertia."""
-    own = {motor.joint for motor in decided.motors if len(motor.turns) == 1}
-    own |= {one.joint for one in robot.followers if one.leader in own}
-    left = [
+    """Add a finding about the armature of joints that no motor has for itself: a device file has rotors, not
+    joints with inertia."""
+    with_motor = {motor.joint for motor in decided.motors if len(motor.turns) == 1}
+    with_motor |= {follower.joint for follower in robot.followers if follower.leader in with_motor}
+    without_motor = [
         f"{name} {joint.armature:.4g}"
         for name, (_, joint) in robot.joints.items()
-        if joint.armature > 0.0 and name not in own and name not in decided.shape.fixed
+        if joint.armature > 0.0 and name not in with_motor and name not in decided.shape.fixed
     ]
-    if left:
-        robot.warn("armature", f"of joints without a motor of their own is left out: {comma_list(left, 8)}")
+    if without_motor:
+        robot.warn(
+            "armature", f"of joints without a motor of their own is left out: {comma_list(without_motor, 8)}"
+        )
 
 
-def _close(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
-    """Write into `section` the joint coordinates at which the loops close, where those of its assembly do not."""
+def _write_closed_posture(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
+    """Write into the table [mechanism], `section`, the joint coordinates at which the loops close, where those of
+    its assembly do not close them."""
     mechanism, angles = decided.motions.mechanism, decided.motions.angles
     (started,) = mechanism.assemblies.values()
     if np.abs(angles - started).max(initial=0.0) <= SETTLED:
@@ -403,6 +427,7 @@ def _close(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
     values = dict(zip(mechanism.links.names, angles.tolist(), strict=True))
     for link in section["links"]:
         name, kind = link["name"], link["joint"]
+        # a joint's coordinates are name/1, name/2, ..., and the last has the link's name
         own = [values[one] for one in (*(f"{name}/{k}" for k in range(1, 6)), name) if one in values]
         if kind == "free":
             assembly["joints_m"][name], assembly["joints_rad"][name] = own[:3], own[3:]
@@ -414,8 +439,10 @@ def _close(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
 
 
 def _direction(robot: Robot, decided: Decided) -> list[float]:
-    """Direction (3,) of a base axis along which the drives move the handle most."""
+    """The base axis (3,) along which the drives move the handle most, x before y before z where they move it
+    alike."""
     sizes = np.linalg.norm(decided.columns[:3], axis=1)
+    # sizes alike to 6 digits count as equal, of which argmax takes the first
     axis = int(np.argmax(np.round(sizes / max(sizes.max(), np.finfo(float).tiny), 6)))
     robot.note(
         "mechanism.reference.direction",
@@ -436,47 +463,61 @@ def robot_device_text(document: dict[str, Any], findings: Sequence[Finding]) -> 
     """The text of a device file.
 
     document  its tables: name, source, mechanism with lists of tables, loop
-    findings  written into its head
+    findings  of the import, written as comments at its top
     """
     return (
-        "\n".join([*_head(document, findings), *_mechanism(document["mechanism"]), *_loop(document["loop"])])
+        "\n".join(
+            [
+                *_head_lines(document, findings),
+                *_mechanism_lines(document["mechanism"]),
+                *_loop_lines(document["loop"]),
+            ]
+        )
         + "\n"
     )
 
 
-def _head(document: dict[str, Any], findings: Sequence[Finding]) -> Iterator[str]:
+def _head_lines(document: dict[str, Any], findings: Sequence[Finding]) -> Iterator[str]:
     """Lines at the top of a device file: findings of the import as comments, then name and source."""
     if findings:
         yield "# What was found while importing:"
     for finding in findings:
         mark = "warning, " if finding.severity == "warning" else ""
-        yield from _comment(f"{mark}{finding}", "  ")
+        yield from _comment_lines(f"{mark}{finding}", "  ")
     yield ""
     for key in ("name", "source"):
         yield f"{key} = {json.dumps(document[key], ensure_ascii=False)}"
 
 
-def _comment(text: str, indent: str = "") -> Iterator[str]:
-    """A text as lines of a TOML comment, wrapped; with an indent, as an item of a list."""
+def _comment_lines(text: str, indent: str = "") -> Iterator[str]:
+    """A text as lines of a TOML comment, wrapped.
+
+    indent  of an item of a list, before all its lines but the first, which has "- "; "" for no list
+    """
     printable = "".join(c if c.isprintable() else " " for c in text)
     for k, line in enumerate(textwrap.wrap(printable, 110, break_long_words=False, break_on_hyphens=False)):
         yield f"# {'- ' if indent and k == 0 else indent}{line}"
 
 
-def _mechanism(mechanism: dict[str, Any]) -> Iterator[str]:
+def _mechanism_lines(mechanism: dict[str, Any]) -> Iterator[str]:
     """Lines of the tables of [mechanism]."""
     for group in ("links", "loops"):
-        yield from _tables(group, mechanism.get(group, []))
-    yield from ("", "# Where the operator holds the device.", "[mechanism.handle]", *_pairs(mechanism["handle"]))
+        yield from _table_lines(group, mechanism.get(group, []))
+    yield from (
+        "",
+        "# Where the operator holds the device.",
+        "[mechanism.handle]",
+        *_key_lines(mechanism["handle"]),
+    )
     for name, assembly in mechanism["assemblies"].items():
         yield from ("", "# Joint coordinates of the reference posture.")
         for key, values in assembly.items():
-            yield from (f"[mechanism.assemblies.{name}.{key}]", *_pairs(values))
-    yield from ("", "[mechanism.reference]", *_pairs(mechanism["reference"]))
-    yield from _tables("drives", mechanism["drives"])
+            yield from (f"[mechanism.assemblies.{name}.{key}]", *_key_lines(values))
+    yield from ("", "[mechanism.reference]", *_key_lines(mechanism["reference"]))
+    yield from _table_lines("drives", mechanism["drives"])
 
 
-def _tables(group: str, entries: Sequence[dict[str, Any]]) -> Iterator[str]:
+def _table_lines(group: str, entries: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Lines of a list of tables of [mechanism], such as its links, below their heading; none for an empty list."""
     if entries:
         yield ""
@@ -484,17 +525,18 @@ def _tables(group: str, entries: Sequence[dict[str, Any]]) -> Iterator[str]:
     for k, entry in enumerate(entries):
         yield from ([""] if k else [])
         yield f"[[mechanism.{group}]]"
-        yield from _pairs(entry)
+        yield from _key_lines(entry)
 
 
-def _loop(loop: dict[str, Any]) -> Iterator[str]:
+def _loop_lines(loop: dict[str, Any]) -> Iterator[str]:
     """Lines of [loop], with a comment where the sampling period is missing."""
-    yield from ("", "[loop]", *_pairs(loop))
+    yield from ("", "[loop]", *_key_lines(loop))
     if "sampling_period_s" not in loop:
         yield "# sampling_period_s = 0.001   # not in the file that was imported; charts and simulations need it"
 
 
-def _pairs(table: dict[str, Any]) -> Iterator[str]:
+def _key_lines(table: dict[str, Any]) -> Iterator[str]:
+    """Lines KEY = VALUE of a table's own keys."""
     for key, value in table.items():
         yield f"{key} = {toml_value(value)}"
 

@@ -40,8 +40,10 @@ def read_bodies(compiled: Compiled, name: str, label: str, keyframe: str | None)
     """
     model = compiled.model
     qpos = reference_coordinates(model, label, keyframe)
-    full = {b.name: np.array(b.fullinertia) for b in compiled.spec.bodies if b.explicitinertial}
-    bodies = [_body(model, i, qpos, compiled, full) for i in range(model.nbody)]
+    given_inertias = {
+        body.name: np.array(body.fullinertia) for body in compiled.spec.bodies if body.explicitinertial
+    }
+    bodies = [_body(model, i, qpos, compiled, given_inertias) for i in range(model.nbody)]
     sites = [
         Site(model.site(i).name or f"site-{i}", int(model.site_bodyid[i]), _site_place(model, i))
         for i in range(model.nsite)
@@ -53,7 +55,8 @@ def read_bodies(compiled: Compiled, name: str, label: str, keyframe: str | None)
 
 
 def reference_coordinates(model: Any, label: str, keyframe: str | None) -> Floats:
-    """qpos of the reference posture. Raises DeviceError for a keyframe that there is not."""
+    """MuJoCo's coordinates of a model, qpos (nq,), in the posture of a keyframe, or for None the file's own.
+    Raises DeviceError for a keyframe that there is not."""
     if keyframe is None:
         return np.array(model.qpos0)
     names = {model.key(i).name: i for i in range(model.nkey) if model.key(i).name}
@@ -63,28 +66,34 @@ def reference_coordinates(model: Any, label: str, keyframe: str | None) -> Float
     return np.array(model.key_qpos[names[keyframe]])
 
 
-def _body(model: Any, i: int, qpos: Floats, compiled: Compiled, full: dict[str, Floats]) -> RobotBody:
-    """Body `i` of a compiled model: its joints at `qpos`, mass, centre and inertia; a mass that only the compiler
-    was given is left out. full: inertia matrices by body name, where the file has them."""
-    if i == 0:
+def _body(
+    model: Any, index: int, qpos: Floats, compiled: Compiled, given_inertias: dict[str, Floats]
+) -> RobotBody:
+    """Body number `index` of a compiled model: its joints at `qpos`, mass, centre and inertia; a mass that only
+    the compiler was given is left out.
+
+    given_inertias  body name -> Ixx, Iyy, Izz, Ixy, Ixz, Iyz (6,), where the file has them
+    """
+    if index == 0:
         return RobotBody("base", -1, UNMOVED)
-    name = model.body(i).name
-    place = Place(rotation_of_quaternion(model.body_quat[i]), np.array(model.body_pos[i]))
-    first, count = int(model.body_jntadr[i]), int(model.body_jntnum[i])
-    joints = tuple(_joint(model, j, place, qpos) for j in range(first, first + count))
-    mass, inertia = float(model.body_mass[i]), _inertia(model, i, full.get(name))
+    name = model.body(index).name
+    place = Place(rotation_of_quaternion(model.body_quat[index]), np.array(model.body_pos[index]))
+    first, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
+    joints = tuple(_joint(model, joint, place, qpos) for joint in range(first, first + count))
+    mass, inertia = float(model.body_mass[index]), _inertia(model, index, given_inertias.get(name))
     if name in compiled.massless | compiled.unknown:
         mass, inertia = 0.0, np.zeros((3, 3))
     known = None if name in compiled.unknown else mass
     return RobotBody(
-        name, int(model.body_parentid[i]), place, joints, known, np.array(model.body_ipos[i]), inertia
+        name, int(model.body_parentid[index]), place, joints, known, np.array(model.body_ipos[index]), inertia
     )
 
 
 def _inertia(model: Any, i: int, six: Floats | None) -> Floats:
-    """Inertia about the centre of mass in the body's axes.
+    """Inertia (3, 3) of body number `i` about the centre of mass in the body's axes [kg m²].
 
     MuJoCo finds principal axes to some ten digits: a matrix that the file gives is taken as it stands there.
+    six  Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the file; None, or nan first: it gives no matrix
     """
     R = rotation_of_quaternion(model.body_iquat[i])
     principal = R @ np.diag(model.body_inertia[i]) @ R.T
@@ -92,17 +101,22 @@ def _inertia(model: Any, i: int, six: Floats | None) -> Floats:
     if six is None or np.isnan(six[0]):
         return np.asarray(principal)
     given = np.asarray(matrix_of_six(six))
-    near = np.abs(given - principal).max() <= 1e-6 * np.abs(principal).max()
-    return given if near else np.asarray(principal)
+    # where they differ the compiler has turned or changed what the file gives
+    same = np.abs(given - principal).max() <= 1e-6 * np.abs(principal).max()
+    return given if same else np.asarray(principal)
 
 
 def _joint(model: Any, j: int, place: Place, qpos: Floats) -> RobotJoint:
-    """Joint `j` of a compiled model, on a body at `place`; its coordinate is that of `qpos` less the rest."""
+    """Joint number `j` of a compiled model, on a body whose place in its parent is `place`.
+
+    qpos  coordinates of the whole model in the posture that is wanted; the joint counts its own from that at rest
+    """
     kind = KINDS[int(model.jnt_type[j])]
+    # places of its first coordinate in qpos and of its first rate
     at, dof = int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
     value: Any
     limits, rest = None, 0.0
-    if kind == "free":
+    if kind == "free":  # position, then quaternion, in the world, of which the body is a child
         way = place.turn.T @ (qpos[at : at + 3] - place.at)
         turn = place.turn.T @ rotation_of_quaternion(qpos[at + 3 : at + 7])
         value = np.concatenate([way, rotation_vector(turn)])
@@ -137,14 +151,18 @@ def _unit(axis: Any) -> Floats:
 
 
 def _site_place(model: Any, i: int) -> Place:
+    """Place of site number `i` in its body's frame."""
     return Place(rotation_of_quaternion(model.site_quat[i]), np.array(model.site_pos[i]))
 
 
 def _tell_of_joints(model: Any, robot: Robot, qpos: Floats) -> None:
-    """Add findings about what a device file holds otherwise of joints: references, springs at rest, limits."""
+    """Add findings about what a device file holds otherwise of joints: references, springs not at rest, limits.
+
+    qpos  coordinates of the model in the reference posture
+    """
     for j in range(model.njnt):
         where, at = f"joint '{model.joint(j).name}'", int(model.jnt_qposadr[j])
-        single = int(model.jnt_type[j]) >= 2
+        single = int(model.jnt_type[j]) >= 2  # a slide or a hinge (`KINDS`)
         rest = float(model.qpos0[at]) if single else 0.0
         if rest:
             robot.note(where, f"has ref = {rest:.6g}: coordinates of the device are those of the file less this")
@@ -187,25 +205,25 @@ def read_urdf(root: ElementTree.Element, label: str) -> Robot:
 
     Raises DeviceError  with all faults of the document, or what MuJoCo refuses
     """
-    faults = list(_faults(root, label))
+    faults = list(_tree_faults(root, label))
     if faults:
         raise DeviceError(faults)
     name = root.get("name") or "robot"
-    robot_findings = Robot(name, label, [])
-    motors, followers = _motors(root, robot_findings), _followers(root)
-    _tell(root, robot_findings)
-    compiled = compile_mjcf(label, xml_text(_for_mujoco(root)))
+    findings_only = Robot(name, label, [])  # collects what is seen before MuJoCo has read the bodies
+    motors, followers = _motors_of_transmissions(root, findings_only), _followers(root)
+    _tell_of_urdf(root, findings_only)
+    compiled = compile_mjcf(label, xml_text(_text_for_mujoco(root)))
     robot = read_bodies(compiled, name, label, None)
-    robot.findings[:0] = robot_findings.findings
+    robot.findings[:0] = findings_only.findings
     robot.motors, robot.followers = motors, followers
     robot.bodies = [replace(body, joints=tuple(map(_with_effort(root), body.joints))) for body in robot.bodies]
     return robot
 
 
-def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
+def _tree_faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
     """Faults by which the links and joints of a URDF are no tree."""
     links = [link.get("name", "") for link in root.findall("link")]
-    carried: dict[str, str] = {}
+    carried: dict[str, str] = {}  # link -> name of the joint that carries it
     for name in sorted({name for name in links if links.count(name) > 1}):
         yield Fault(label, f"link '{name}'", "is there twice; names must differ")
     for joint in root.findall("joint"):
@@ -243,8 +261,9 @@ def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
         )
 
 
-def _for_mujoco(root: ElementTree.Element) -> str:
-    """The document without what is only seen or touched, and without what is read here."""
+def _text_for_mujoco(root: ElementTree.Element) -> str:
+    """The text of a URDF for MuJoCo: its links and joints without what is only seen or touched, and without
+    `mimic`, which is read here."""
     kept = ElementTree.Element("robot", root.attrib)
     settings = ElementTree.SubElement(ElementTree.SubElement(kept, "mujoco"), "compiler")
     settings.attrib.update(COMPILER)
@@ -257,11 +276,12 @@ def _for_mujoco(root: ElementTree.Element) -> str:
 
 
 def _with_effort(root: ElementTree.Element) -> Callable[[RobotJoint], RobotJoint]:
-    """A function that gives a joint the effort that its limit states."""
+    """A function that gives a joint the effort that its <limit> states [N m] or [N]; None where that is 0 or
+    infinite."""
     efforts = {}
     for joint in root.findall("joint"):
         limit = joint.find("limit")
-        effort = _number(limit, "effort", 0.0)
+        effort = _number_in(limit, "effort", 0.0)
         efforts[joint.get("name", "")] = effort if effort > 0.0 and math.isfinite(effort) else None
 
     def with_effort(joint: RobotJoint) -> RobotJoint:
@@ -270,9 +290,9 @@ def _with_effort(root: ElementTree.Element) -> Callable[[RobotJoint], RobotJoint
     return with_effort
 
 
-def _number(element: ElementTree.Element | None, key: str, default: float) -> float:
-    """A number of an element, or of its text where key is empty; MuJoCo refuses what is none, where it reads
-    it."""
+def _number_in(element: ElementTree.Element | None, key: str, default: float) -> float:
+    """The number in an attribute of an element, or in its text where `key` is empty; the default where there is no
+    element or no number: MuJoCo refuses what is none, where it reads it."""
     try:
         return float((element.get(key) if key else element.text) or "") if element is not None else default
     except ValueError:
@@ -286,20 +306,21 @@ def _followers(root: ElementTree.Element) -> list[Follower]:
         mimic = joint.find("mimic")
         if mimic is not None:
             name = joint.get("name", "")
-            ratio = _number(mimic, "multiplier", 1.0)
+            ratio = _number_in(mimic, "multiplier", 1.0)
             found.append(
                 Follower(
-                    f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio, _number(mimic, "offset", 0.0)
+                    f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio, _number_in(mimic, "offset", 0.0)
                 )
             )
     return found
 
 
-def _motors(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
-    """The motors that transmissions name; None where there is none."""
+def _motors_of_transmissions(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
+    """The motors that transmissions of a URDF name, one for each joint; None where there is none. Findings about
+    transmissions that are left out are added to `robot`."""
     kinds = {joint.get("name", ""): joint.get("type", "") for joint in root.findall("joint")}
     efforts = {
-        joint.get("name", ""): _number(joint.find("limit"), "effort", 0.0) for joint in root.findall("joint")
+        joint.get("name", ""): _number_in(joint.find("limit"), "effort", 0.0) for joint in root.findall("joint")
     }
     motors: dict[str, Motor] = {}
     for transmission in root.findall("transmission"):
@@ -313,7 +334,7 @@ def _motors(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
         reduction = actuators[0].find("mechanicalReduction") if actuators else None
         if reduction is None:
             reduction = transmission.find("mechanicalReduction")
-        ratio = abs(_number(reduction, "", 0.0))
+        ratio = abs(_number_in(reduction, "", 0.0))
         turns = {joints[0]: ratio} if ratio else {}
         effort = efforts[joints[0]]
         torque = effort / ratio if ratio and effort > 0.0 else None
@@ -322,7 +343,7 @@ def _motors(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
     return list(motors.values()) or None
 
 
-def _tell(root: ElementTree.Element, robot: Robot) -> None:
+def _tell_of_urdf(root: ElementTree.Element, robot: Robot) -> None:
     """Add findings about parts of a URDF that MuJoCo ignores, and about numbers that look like another unit."""
     for joint in root.findall("joint"):
         where = f"joint '{joint.get('name', '')}'"
@@ -330,9 +351,9 @@ def _tell(root: ElementTree.Element, robot: Robot) -> None:
             if joint.find(tag) is not None:
                 robot.note(f"{where}, {tag}", what)
         limit = joint.find("limit")
-        if limit is not None and _number(limit, "velocity", 0.0) > 0.0:
+        if limit is not None and _number_in(limit, "velocity", 0.0) > 0.0:
             robot.note(f"{where}, limit", "has a velocity; a device file has no place for it")
-        largest = max(abs(_number(limit, "lower", 0.0)), abs(_number(limit, "upper", 0.0)))
+        largest = max(abs(_number_in(limit, "lower", 0.0)), abs(_number_in(limit, "upper", 0.0)))
         if joint.get("type") == "revolute" and SEVERAL_TURNS < largest < math.inf:
             robot.warn(
                 f"{where}, limit",

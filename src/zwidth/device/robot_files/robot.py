@@ -46,10 +46,12 @@ class Place:
     at: Floats
 
     def __matmul__(self, other: Place) -> Place:
+        """The place in the outer frame of what `other` places in the inner one."""
         return Place(self.turn @ other.turn, self.at + self.turn @ other.at)
 
     @property
     def inverse(self) -> Place:
+        """The place of the outer frame in the inner one."""
         return Place(self.turn.T, -self.turn.T @ self.at)
 
     def of_point(self, point: Floats) -> Floats:
@@ -148,7 +150,12 @@ class Motor:
 
 @dataclass(frozen=True)
 class Follower:
-    """A joint that follows another one rigidly: coordinate = ratio x leader's + offset."""
+    """A joint that follows another one rigidly: coordinate = ratio x leader's + offset.
+
+    where   the element of the file;   joint, leader  names; leader "": the joint is held at the offset
+    offset  of the joint's coordinate [rad] or [m]
+    linear  False: a curve is added to this, which no linkage holds
+    """
 
     where: str
     joint: str
@@ -211,7 +218,10 @@ class Robot:
 
 
 def joint_motion(joint: RobotJoint, value: Any) -> Place:
-    """Where a joint at a coordinate takes its body's frame, in that frame at coordinate 0."""
+    """Where a joint takes its body's frame: its place in that frame at coordinate 0.
+
+    value  as of `RobotJoint`: a number, of a ball joint a rotation vector (3,), of a free one way and vector (6,)
+    """
     if joint.kind == "prismatic":
         return Place(np.eye(3), float(value) * joint.axis)
     if joint.kind == "free":

@@ -36,7 +36,7 @@ def lags_wrongly(tau: Any, T: Any) -> Any:
 
 
 def lags_allowed(T: float) -> str:
-    """Within which bounds a lag may be, at a sampling period [s]."""
+    """The words for the bounds of a lag that is not 0, at a sampling period T [s]."""
     return (
         f"from {SHORTEST_LAG:g} to {LONGEST_LAG:g} sampling periods, {SHORTEST_LAG * T:g} to {LONGEST_LAG * T:g} s"
     )
@@ -48,6 +48,7 @@ def lag_rule(place: str, key: str) -> NumberRule:
 
 
 def _lag_sentence(tau: float, T: float) -> str:
+    """What is wrong with a lag tau [s] at a sampling period T [s]."""
     return f"must be 0 (no lag) or {lags_allowed(T)}, got {tau:.10g}"
 
 
@@ -81,18 +82,25 @@ def _cutoff_sentence(cutoff: float, T: float) -> str:
 
 
 def _estimate_rules(section: str, period: Read = Numbers.period) -> tuple[Rule, ...]:
-    """The rules of the velocity estimate of a section, with a sampling period of its own: a low pass, a linear
-    method, the size of the encoder's error, and of a Kalman filter the tracking index."""
-    place, figures = f"{section}.velocity", (_acceleration, _position_noise, period)
+    """The rules of the velocity estimate of a section, such as "loop.local": a low pass, a linear method, the size
+    of the encoder's error, and of a Kalman filter the tracking index.
+
+    period  reads the sampling period at which the section runs
+    """
+    place, reads = f"{section}.velocity", (_kalman_acceleration, _position_noise, period)
     return (
         _cutoff_rule(f"{place}.filter", period),
-        lambda document: _noise(document, section),
-        NumberRule(place, "", figures, _unusable_index, _index_sentence),
+        lambda document: _estimate_faults(document, section),
+        NumberRule(place, "", reads, _unusable_index, _index_sentence),
     )
 
 
-def _noise(document: Document, section: str) -> KeyMessages:
-    """Path and sentence of a feedback's velocity estimate that is not linear, and of a missing error size."""
+def _estimate_faults(document: Document, section: str) -> KeyMessages:
+    """Path and sentence of a velocity estimate that is not linear, in another section than [loop], and of a
+    missing error size.
+
+    section  that holds the estimate, such as "loop.local"
+    """
     loop, place = table(document, "loop"), (*section.split("."), "velocity")
     velocity = table(loop if section == "loop" else table(loop, place[1]), "velocity")
     method = velocity.get("method")
@@ -109,13 +117,17 @@ def _noise(document: Document, section: str) -> KeyMessages:
         )
 
 
-def _acceleration(velocity: Numbers) -> Any:
+def _kalman_acceleration(velocity: Numbers) -> Any:
     """The acceleration noise that a Kalman filter is built for [m/s²]; None of other estimates."""
     return velocity.number("acceleration_noise_m_per_s2") if velocity.held("method") == "kalman" else None
 
 
 def _position_noise(velocity: Numbers) -> Any:
-    """Standard deviation of the encoder's error [m]: as given, or of its step, which no array stands for."""
+    """Standard deviation of the encoder's error [m]: as given; or else that of its step in the document, the same
+    in all designs; None where there is neither.
+
+    velocity  seen from the table of the estimate
+    """
     if velocity.held("position_noise_m") is not None:
         return velocity.number("position_noise_m")
     step = Numbers(velocity.document, ("loop", "encoder")).number("resolution_m")
@@ -123,7 +135,11 @@ def _position_noise(velocity: Numbers) -> Any:
 
 
 def _unusable_index(acceleration: Any, noise: Any, T: Any) -> Any:
-    """Whether noise figures [m/s²], [m] that may be by themselves make no filter at sampling periods [s]."""
+    """Whether a Kalman filter's tracking index, acceleration T^2 / noise, is out of range, where each number alone
+    is allowed.
+
+    acceleration, noise, T  noise figures [m/s²], [m] and sampling periods [s]
+    """
     index = acceleration * T**2 / noise
     possible = (acceleration > 0) & (acceleration <= LARGEST) & (noise > 0) & (noise <= LARGEST)
     return possible & ~((index >= INDEX[0]) & (index <= INDEX[1]))
@@ -138,7 +154,7 @@ def _index_sentence(acceleration: float, noise: float, T: float) -> str:
     raise AssertionError("a Kalman filter takes what its rule refuses")
 
 
-def _sensor_handle(document: Document) -> KeyMessages:
+def _sensor_without_handle(document: Document) -> KeyMessages:
     """Path and sentence of a force sensor on a plant of several coordinates without a handle."""
     plant = table(document, "plant")
     size = row_count(plant.get("mass_kg"))
@@ -149,7 +165,7 @@ def _sensor_handle(document: Document) -> KeyMessages:
         )
 
 
-def _without_motion(document: Document) -> KeyMessages:
+def _feedback_without_motion(document: Document) -> KeyMessages:
     """Path and sentence of each feedback on motion in time beside a loss factor, which has none."""
     for section in SENSED if table(document, "plant").get("loss_factor") else ():
         if section in table(document, "loop"):
@@ -188,8 +204,8 @@ COMPUTER: Final[tuple[Rule, ...]] = (
     *(KeyRule("loop", section, f"{section} /response", "",
               "needs a model of the device, and a [response] is none; measure the response with it switched on, "
               "and remove this") for section in SENSED),
-    _without_motion,
-    _sensor_handle,
+    _feedback_without_motion,
+    _sensor_without_handle,
     _cutoff_rule("loop.force_sensor.filter"),
     KeyRule(AHEAD, "inertia_share", INERTIAS, "",
             "stands beside inertia_kg; only one of them is allowed: remove the other"),
@@ -207,14 +223,16 @@ COMPUTER: Final[tuple[Rule, ...]] = (
 # fmt: on
 
 
-def _no_whole_number(delay: Any, T: Any = 1.0) -> Any:
-    """Whether delays are no whole numbers of sampling periods, in their unit."""
+def _is_no_whole_number(delay: Any, T: Any = 1.0) -> Any:
+    """Whether delays are no whole numbers of sampling periods T, both in one unit; from MANY_SAMPLES on none is
+    whole."""
     samples = delay / T
     return np.abs(samples - np.where(samples < MANY_SAMPLES, np.round(samples), 0.0)) > WHOLE
 
 
 def _added_delay(key: str) -> Read:
-    """The delay that software adds to a measured response; None of another device."""
+    """A function that reads, of [loop], the delay under `key` that software adds to a measured response; None of
+    another device."""
     return lambda loop: loop.number(key) if "response" in loop.document else None
 
 
@@ -229,8 +247,8 @@ RESPONSE: Final[tuple[Rule, ...]] = (
     KeyRule("response", "", "", "file files", f"names no file; {FILES}"),
     KeyRule("loop", "actuator", "actuator /response", "",
             "is part of a measured [response] already; leave it out"),
-    NumberRule("loop", "delay_samples", (_added_delay("delay_samples"),), _no_whole_number, NOT_WHOLE),
-    NumberRule("loop", "delay_s", (_added_delay("delay_s"), Numbers.period), _no_whole_number, NOT_WHOLE),
+    NumberRule("loop", "delay_samples", (_added_delay("delay_samples"),), _is_no_whole_number, NOT_WHOLE),
+    NumberRule("loop", "delay_s", (_added_delay("delay_s"), Numbers.period), _is_no_whole_number, NOT_WHOLE),
 )
 # fmt: on
 

@@ -43,8 +43,9 @@ STIFFNESSES: Final = (
 )
 
 
-def _tree(document: Document) -> KeyMessages:
-    """Path and sentence of links of which names repeat, parents do not exist, or that are their own ancestor."""
+def _tree_faults(document: Document) -> KeyMessages:
+    """Path and sentence of links whose names repeat, whose parents do not exist or that are their own ancestors,
+    and of loops and drives whose names repeat."""
     mechanism = table(document, "mechanism")
     parents: dict[str, Any] = {}
     for index, link in tables(mechanism, "links"):
@@ -56,7 +57,7 @@ def _tree(document: Document) -> KeyMessages:
     for index, link in tables(mechanism, "links"):
         parent = link.get("parent")
         if isinstance(parent, str) and parent not in parents and parent != "base":
-            yield ("mechanism", "links", index, "parent"), _no_link(parent, {*parents, "base"})
+            yield ("mechanism", "links", index, "parent"), _no_link_sentence(parent, {*parents, "base"})
     reported: set[str] = set()
     for index, link in tables(mechanism, "links"):
         circle = _circle(link.get("name"), parents)
@@ -68,7 +69,7 @@ def _tree(document: Document) -> KeyMessages:
                 "(close loops by [[mechanism.loops]])",
             )
     for group in ("links", "loops", "drives"):
-        yield from _twice(mechanism, group)
+        yield from _repeated_names(mechanism, group)
 
 
 def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
@@ -82,7 +83,7 @@ def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
     return way if parent == name else []
 
 
-def _twice(mechanism: dict[str, Any], group: str) -> KeyMessages:
+def _repeated_names(mechanism: dict[str, Any], group: str) -> KeyMessages:
     """Path and sentence of each name that a list of [mechanism], such as its links, gives a second time."""
     names_so_far: set[str] = set()
     for index, entry in tables(mechanism, group):
@@ -93,40 +94,41 @@ def _twice(mechanism: dict[str, Any], group: str) -> KeyMessages:
             names_so_far.add(name)
 
 
-def _no_link(name: str, links: Collection[str]) -> str:
+def _no_link_sentence(name: str, links: Collection[str]) -> str:
+    """The sentence for a name that is none of the links."""
     return f"'{name}' is not a link; {suggestion(name, links, 'links')}"
 
 
-def _references(document: Document) -> KeyMessages:
-    """Path and sentence of loops, handle or drives on links or joints that do not exist or do not fit."""
+def _reference_faults(document: Document) -> KeyMessages:
+    """Path and sentence of loops, handle or drives on links that do not exist, or whose joint they cannot have."""
     mechanism = table(document, "mechanism")
-    links = _joints(mechanism)
-    yield from _links_of_loops(mechanism, links)
+    joint_kinds = _joint_kinds(mechanism)
+    yield from _loop_link_faults(mechanism, joint_kinds)
     link = table(mechanism, "handle").get("link")
-    if isinstance(link, str) and link not in links:
-        yield ("mechanism", "handle", "link"), _no_link(link, links)
+    if isinstance(link, str) and link not in joint_kinds:
+        yield ("mechanism", "handle", "link"), _no_link_sentence(link, joint_kinds)
     driven: set[str] = set()
     for index, drive in tables(mechanism, "drives"):
         joint, path = drive.get("joint"), ("mechanism", "drives", index, "joint")
         if not isinstance(joint, str):
             continue
-        if joint not in links:
-            yield path, _no_link(joint, links)
-        elif links[joint] == "fixed":
+        if joint not in joint_kinds:
+            yield path, _no_link_sentence(joint, joint_kinds)
+        elif joint_kinds[joint] == "fixed":
             yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute or prismatic joint"
-        elif links[joint] in SEVERAL:
+        elif joint_kinds[joint] in SEVERAL:
             yield (
                 path,
-                f"'{joint}' has a {links[joint]} joint; a drive needs a revolute or prismatic one: make it "
+                f"'{joint}' has a {joint_kinds[joint]} joint; a drive needs a revolute or prismatic one: make it "
                 "of several, with links of no mass between them",
             )
         elif joint in driven:
             yield path, f"'{joint}' has a drive already; one joint takes one drive"
         driven.add(joint)
-    yield from _couplings(mechanism, links, driven)
+    yield from _coupling_faults(mechanism, joint_kinds, driven)
 
 
-def _links_of_loops(mechanism: dict[str, Any], links: dict[str, Any]) -> KeyMessages:
+def _loop_link_faults(mechanism: dict[str, Any], links: dict[str, Any]) -> KeyMessages:
     """Yield what is wrong with the links that loops join: names of none, and one link joined to itself.
 
     links  name -> joint of each link
@@ -136,13 +138,16 @@ def _links_of_loops(mechanism: dict[str, Any], links: dict[str, Any]) -> KeyMess
         names = names if isinstance(names, list) else []
         for place, name in enumerate(names):
             if isinstance(name, str) and name not in links and name != "base":
-                yield ("mechanism", "loops", index, "links", place), _no_link(name, {*links, "base"})
+                yield ("mechanism", "loops", index, "links", place), _no_link_sentence(name, {*links, "base"})
         if len(names) == 2 and names[0] == names[1]:
             yield ("mechanism", "loops", index, "links"), f"joins '{names[0]}' to itself; name two different links"
 
 
-def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
-    """Path and sentence of couplings of drives to joints neither driven nor free, and motors on no link."""
+def _coupling_faults(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
+    """Path and sentence of couplings of drives to joints neither driven nor free, and motors on no link.
+
+    links   name -> joint of each link;   driven  names of the links whose joints have drives
+    """
     of_links = [link for _, link in tables(mechanism, "links") if link.get("free") is True]
     free = {name for link in of_links if isinstance(name := link.get("name"), str)}
     for index, drive in tables(mechanism, "drives"):
@@ -151,14 +156,14 @@ def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str
         for name in table(drive, "coupling"):
             path: KeyPath = ("mechanism", "drives", index, "coupling", name)
             if name not in links:
-                yield path, _no_link(name, links)
+                yield path, _no_link_sentence(name, links)
             elif name == drive.get("joint"):
                 yield path, "is the drive's own joint, whose ratio is transmission_ratio; remove it"
             elif name not in driven | free or links[name] in SEVERAL:
                 yield path, f"'{name}' has no joint that is driven or free; a motor can turn with such joints only"
         link = drive.get("motor_link")
         if isinstance(link, str) and link not in links and link != "base":
-            yield ("mechanism", "drives", index, "motor_link"), _no_link(link, {*links, "base"})
+            yield ("mechanism", "drives", index, "motor_link"), _no_link_sentence(link, {*links, "base"})
         for key, other in (("motor_link", "motor_axis"), ("motor_axis", "motor_link")):
             if key in drive and other not in drive:
                 yield ("mechanism", "drives", index, other), f"is missing; {key} needs it"
@@ -183,11 +188,14 @@ def _ratio_tables(document: Document) -> KeyMessages:
         joint = drive.get("joint")
         link = links.get(joint) if isinstance(joint, str) else None
         if isinstance(drive["ratio_table"], dict) and link is not None and link.get("joint") in OF_JOINT:
-            yield from _ratio_table(place, drive["ratio_table"], link)
+            yield from _ratio_table_faults(place, drive["ratio_table"], link)
 
 
-def _ratio_table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMessages:
-    """Path and sentence of one ratio table whose coordinates, ratios or range do not fit its drive's joint."""
+def _ratio_table_faults(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of one ratio table whose coordinates, ratios or range do not fit its drive's joint.
+
+    place  path of the table;   given  the table;   link  table of the link whose joint is driven
+    """
     joint = link["joint"]
     key, limits_key, unit = OF_JOINT[joint]  # no names in the sentences: the copies of a leg have the same fault
     for other, *_ in OF_JOINT.values():
@@ -227,24 +235,26 @@ def _ratio_table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) ->
 
 
 def _assemblies(document: Document) -> KeyMessages:
-    """Path and sentence of assemblies whose tables lack joints, name others or give a wrong number count."""
+    """Path and sentence of assemblies that lack a joint's coordinates, give them to other joints, or another
+    number of them."""
     mechanism = table(document, "mechanism")
-    joints = _joints(mechanism)
+    joints = _joint_kinds(mechanism)
     turning = {name: count for name, joint in joints.items() if (count := ANGLES.get(joint, 0))}
     sliding = {name: count for name, joint in joints.items() if (count := WAYS.get(joint, 0))}
     assemblies = table(mechanism, "assemblies")
     for name, assembly in assemblies.items():
-        for key, counts, moves, way in (
+        # key of a table, coordinates of each joint in it, and two pieces of sentences
+        for key, counts, moves, what in (
             ("joints_rad", turning, "turns", "angle for every revolute joint"),
             ("joints_m", sliding, "slides", "way for every prismatic joint"),
         ):
             given = assembly.get(key, {}) if isinstance(assembly, dict) else None
             if isinstance(given, dict):
                 path = ("mechanism", "assemblies", name, key)
-                yield from _coordinates(path, given, counts, moves)
+                yield from _coordinate_faults(path, given, counts, moves)
                 needed = {joint for joint in counts if joints[joint] not in ("spherical", "free")}
                 for joint in sorted(needed - set(given)):
-                    yield (*path, joint), f"is missing; give an approximate {way}"
+                    yield (*path, joint), f"is missing; give an approximate {what}"
     reference = table(mechanism, "reference")
     wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
     if isinstance(wanted, str) and assemblies and wanted not in assemblies:
@@ -253,9 +263,13 @@ def _assemblies(document: Document) -> KeyMessages:
         yield place, f"is missing; choose one of {comma_list(sorted(assemblies))}"
 
 
-def _coordinates(path: KeyPath, given: dict[str, Any], counts: dict[str, int], moves: str) -> KeyMessages:
-    """Path and sentence of each joint in a table of coordinates that does not exist, or has another number of them
-    (counts, by name). moves: how the table's joints move, for the sentence."""
+def _coordinate_faults(path: KeyPath, given: dict[str, Any], counts: dict[str, int], moves: str) -> KeyMessages:
+    """Path and sentence of each joint in a table of coordinates that does not exist, or has another number of
+    them.
+
+    path    of the table;   given  the table
+    counts  link name -> number of coordinates;   moves  how the table's joints move, for the sentence
+    """
     for joint, value in given.items():
         if joint not in counts:
             yield (*path, joint), f"names no joint that {moves}; {suggestion(joint, set(counts), 'joints')}"
@@ -286,10 +300,10 @@ def _beams(document: Document) -> KeyMessages:
     """Path and sentence of each disagreement of a link and its [beam]: length, joint, section, modes."""
     for path, link in places(document, "mechanism.links.*"):
         if isinstance(link.get("beam"), dict):
-            yield from _beam(path, link)
+            yield from _beam_faults(path, link)
 
 
-def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
+def _beam_faults(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
     """Path and sentence of each disagreement of one link, at `place`, and its [beam]."""
     beam, at = table(link, "beam"), (*place, "beam")
     length = link.get("length_m", 0.0)
@@ -329,10 +343,10 @@ def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
             (*place, lacking),
             "is missing; give mass and inertia of the whole link, or neither for the beam's own",
         )
-    yield from _wall((*at, "section"), table(beam, "section"))
+    yield from _wall_fault((*at, "section"), table(beam, "section"))
 
 
-def _wall(place: KeyPath, section: dict[str, Any]) -> KeyMessages:
+def _wall_fault(place: KeyPath, section: dict[str, Any]) -> KeyMessages:
     """Path and sentence of a hollow section's wall that is thicker than half the section."""
     across = [section[key] for key in ("outer_diameter_m", "width_m", "height_m") if is_number(section.get(key))]
     wall = section.get("wall_m")
@@ -356,22 +370,23 @@ def _workspace_rule(index: int, axis: str) -> NumberRule:
     return NumberRule(
         "mechanism",
         f"workspace.{axis}_m",
-        (f"reference.position_m.{index}", lambda mechanism: _pair(mechanism.numbers(f"workspace.{axis}_m"))),
+        (f"reference.position_m.{index}", lambda mechanism: _two_bounds(mechanism.numbers(f"workspace.{axis}_m"))),
         _outside,
         lambda x, bounds: f"{quote(bounds)} leaves out the reference position, {axis} = {x:.10g}; widen it",
     )
 
 
-def _pair(bounds: Any) -> Any:
-    """Lower and upper bounds (..., 2); None of a value that is no two numbers."""
+def _two_bounds(bounds: Any) -> Any:
+    """Lower and upper bounds (..., 2) as they are; None for what is no two numbers."""
     return bounds if bounds is not None and np.shape(bounds)[-1] == 2 else None
 
 
-def _damping(document: Document) -> KeyMessages:
+def _damping_ways(document: Document) -> KeyMessages:
     """Path and sentence of a [mechanism.damping] that gives no way of damping, or several."""
     damping, path = table(document, "mechanism").get("damping"), ("mechanism", "damping")
     if isinstance(damping, dict):
         proportional = {"mass_coefficient_1_per_s", "stiffness_coefficient_s"} & damping.keys()
+        # the ways that the table gives, both numbers of proportional damping being one
         ways = ["mode_ratio"] * ("mode_ratio" in damping)
         ways += [" and ".join(sorted(proportional))] * bool(proportional) + ["given"] * ("given" in damping)
         choice = "mode_ratio, or mass_coefficient_1_per_s and stiffness_coefficient_s, or given = true"
@@ -381,8 +396,8 @@ def _damping(document: Document) -> KeyMessages:
             yield path, f"has {', '.join(ways)}; exactly one way is allowed: {choice}"
 
 
-def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
-    """Joint of each link, by its name; None for what is no name of a joint."""
+def _joint_kinds(mechanism: dict[str, Any]) -> dict[str, Any]:
+    """Link name -> kind of its joint, such as "revolute"; None where the file gives no text for it."""
     return {
         link["name"]: link["joint"] if isinstance(link.get("joint"), str) else None
         for _, link in tables(mechanism, "links")
@@ -390,14 +405,15 @@ def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _of_named_links(document: Document) -> KeyMessages:
+def _faults_of_named_links(document: Document) -> KeyMessages:
     """Faults of tables that name links: loops, handle, drives, ratio tables, assemblies; none without links."""
-    if _joints(table(document, "mechanism")):
-        yield from rule_faults((_references, _ratio_tables, _assemblies), document)
+    if _joint_kinds(table(document, "mechanism")):
+        yield from rule_faults((_reference_faults, _ratio_tables, _assemblies), document)
 
 
-def _arm(document: Document) -> KeyMessages:
-    """What a mechanism has too: links with joints, a hand, the posture as an assembly; and how the hand holds."""
+def _arm_faults(document: Document) -> KeyMessages:
+    """Path and sentence of faults of [arm]: how its hand holds, and what of a chain of links a mechanism has,
+    too."""
     arm = table(document, "arm")
     if "arm" not in document:
         return
@@ -412,12 +428,12 @@ def _arm(document: Document) -> KeyMessages:
         "handle": arm.get("hand", {}),
         "assemblies": {HELD: posture if isinstance(posture, dict) else {}},
     }
-    for path, message in rule_faults((_tree, _assemblies, _joint_keys), {"mechanism": chain}):
-        yield _in_arm(path), message
+    for path, message in rule_faults((_tree_faults, _assemblies, _joint_keys), {"mechanism": chain}):
+        yield _path_in_arm(path), message
 
 
-def _in_arm(path: KeyPath) -> KeyPath:
-    """A path of the mechanism that stands for the arm, in the arm."""
+def _path_in_arm(path: KeyPath) -> KeyPath:
+    """Where the [arm] has what is at a path of the [mechanism] that stands for it."""
     if path[:3] == ("mechanism", "assemblies", HELD):
         return ("arm", "posture", *path[3:])
     if path[:2] == ("mechanism", "handle"):
@@ -453,11 +469,11 @@ ARM: Final[tuple[Rule, ...]] = (
       for key in ("mass_kg", "inertia_kg_m2")),
     KeyRule("arm.links.*", "free", "free", "", "does not apply: all joints of an arm are free; remove it"),
     KeyRule("arm.links.*", "beam", "beam", "", "does not apply: the links of an arm do not bend; remove it"),
-    _arm,
+    _arm_faults,
 )
 MECHANISM: Final[tuple[Rule, ...]] = (
-    _tree,
-    _of_named_links,
+    _tree_faults,
+    _faults_of_named_links,
     _joint_keys,
     _beams,
     KeyRule(LOOPS, "axes", "axes", "closes=axis", 'is used only with closes = "axis"; set that or remove this'),
@@ -476,7 +492,7 @@ MECHANISM: Final[tuple[Rule, ...]] = (
     *(KeyRule(REFERENCE, "characteristic_length_m", "characteristic_length_m", key, NO_SCREW)
       for key in ("direction", "axis")),
     *(_workspace_rule(index, axis) for index, axis in enumerate("xyz")),
-    _damping,
+    _damping_ways,
     KeyRule(DRIVES, "damping_Nms_per_rad", "damping_Nms_per_rad", "/mechanism.damping.given",
             "is used only with mechanism.damping.given = true; set that or remove this"),
     NumberRule(DRIVES, "motor_inertia_kg_m2", ("motor_inertia_kg_m2", "stiffness_Nm_per_rad"),

@@ -26,11 +26,12 @@ ELASTIC: Final = ("grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m")
 NOT_MEASURED: Final = "does not apply to a measured [response], which is charted and not simulated; leave it out"
 
 
-def _plant(document: Document) -> KeyMessages:
-    """Sizes that agree, what several coordinates need, a stiffness that a loss factor is a share of."""
+def _plant_sizes(document: Document) -> KeyMessages:
+    """Path and sentence of matrices and vectors of [plant] that disagree on the number of coordinates, of vectors
+    that several coordinates need, and of a loss factor where there is no stiffness that it could be a share of."""
     plant = table(document, "plant")
     loss = plant.get("loss_factor")
-    if is_number(loss) and loss > 0 and _springless(plant.get("stiffness_N_per_m")):
+    if is_number(loss) and loss > 0 and _has_no_spring(plant.get("stiffness_N_per_m")):
         yield (
             ("plant", "loss_factor"),
             "is a share of the stiffness, and there is none; give stiffness_N_per_m, or remove this",
@@ -43,33 +44,34 @@ def _plant(document: Document) -> KeyMessages:
         if count is not None and count != size:
             yield ("plant", key), f"has {count} rows, but mass_kg has {size}; give a {size} x {size} matrix"
     for key in ("actuator", "sensor", "handle"):
-        yield from _along_fault(("plant", key), plant.get(key), size)
+        yield from _length_fault(("plant", key), plant.get(key), size)
         if plant.get(key) is None and size > 1 and key != "handle":
             yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
 
 
-def _springless(stiffness: Any) -> bool:
+def _has_no_spring(stiffness: Any) -> bool:
     """Whether a stiffness is left out, or zero throughout."""
     if isinstance(stiffness, list):
-        return all(map(_springless, stiffness))
+        return all(map(_has_no_spring, stiffness))
     return stiffness is None or (is_number(stiffness) and stiffness == 0)
 
 
-def _along_fault(place: KeyPath, along: Any, size: int | None) -> KeyMessages:
-    """Path and sentence of a vector whose length is not the plant's number of coordinates, `size`."""
-    length = 1 if is_number(along) else len(along) if isinstance(along, list) else None
+def _length_fault(path: KeyPath, vector: Any, size: int | None) -> KeyMessages:
+    """Path and sentence of a vector whose length is not the plant's number of coordinates, `size`; none where
+    either is not known."""
+    length = 1 if is_number(vector) else len(vector) if isinstance(vector, list) else None
     if size is not None and length is not None and length != size:
-        yield place, f"has {plural(length, 'number')}, but mass_kg has {plural(size, 'row')}; give {size}"
+        yield path, f"has {plural(length, 'number')}, but mass_kg has {plural(size, 'row')}; give {size}"
 
 
-def _along(document: Document) -> KeyMessages:
+def _along_lengths(document: Document) -> KeyMessages:
     """Path and sentence of spring, brake or winding vectors that do not fit the plant's coordinates."""
     plant = table(document, "plant")
     size = row_count(plant.get("mass_kg"))
     for group in ("spring", "brake", "electrical_damping"):
         for index, element in tables(plant, group):
             place: KeyPath = ("plant", group, index, "along")
-            yield from _along_fault(place, element.get("along"), size)
+            yield from _length_fault(place, element.get("along"), size)
             if group == "spring" and "along" not in element and size is not None and size > 1:
                 yield (
                     place,
@@ -77,12 +79,12 @@ def _along(document: Document) -> KeyMessages:
                 )
 
 
-def _reading(document: Document) -> KeyMessages:
+def _unread_encoder_keys(document: Document) -> KeyMessages:
     """Path and sentence of [loop.encoder] keys in metres that a mechanism or a measured response does not read."""
     loop = table(document, "loop")
     encoder, velocity = table(loop, "encoder"), table(loop, "velocity")
     kalman = velocity.get("method") == "kalman"
-    filtered = kalman and "position_noise_m" not in velocity
+    filter_reads_step = kalman and "position_noise_m" not in velocity
     instead = {"resolution_m": "encoder_counts_per_rev", "noise_m": "encoder_noise_rad"}
     for key, drive_key in instead.items():
         if key not in encoder:
@@ -91,36 +93,38 @@ def _reading(document: Document) -> KeyMessages:
         if "mechanism" in document:
             hint = ", and velocity.position_noise_m for the filter" if kalman else ""
             yield place, f"is for a [plant]; the drives of a mechanism give {drive_key}{hint}"
-        elif "response" in document and not (filtered and key == "resolution_m"):
+        elif "response" in document and not (filter_reads_step and key == "resolution_m"):
             yield place, NOT_MEASURED
 
 
-def _friction(document: Document) -> KeyMessages:
-    """[friction] of a plant: a level for each coordinate, and what its model reads."""
+def _plant_friction(document: Document) -> KeyMessages:
+    """Path and sentence of faults of the [friction] of a plant: its levels, and what its model reads or needs."""
     friction = table(document, "friction")
     if "friction" not in document or {"mechanism", "response"} & document.keys():
         return
     size = row_count(table(document, "plant").get("mass_kg"))
     for key in ("coulomb_N", "breakaway_N"):
-        yield from _along_fault(("friction", key), friction.get(key), size)
+        yield from _length_fault(("friction", key), friction.get(key), size)
     coulomb, breakaway = _levels(friction.get("coulomb_N")), _levels(friction.get("breakaway_N"))
-    above = False
+    breaks_above = False
     if len(coulomb) == len(breakaway):
         listed = isinstance(friction.get("breakaway_N"), list)
         for i, (level, static) in enumerate(zip(coulomb, breakaway, strict=True)):
             place: KeyPath = ("friction", "breakaway_N", i) if listed else ("friction", "breakaway_N")
-            yield from _breakaway(place, static, level, "coulomb_N")
-            above |= static > level > 0
-    yield from _grip(("friction",), friction, any(level > 0 for level in coulomb), above, "_N_per_m", "_m_per_s")
+            yield from _breakaway_fault(place, static, level, "coulomb_N")
+            breaks_above |= static > level > 0
+    yield from _friction_model_faults(
+        ("friction",), friction, any(level > 0 for level in coulomb), breaks_above, "_N_per_m", "_m_per_s"
+    )
 
 
 def _levels(value: Any) -> list[float]:
-    """The numbers of a list or of one number; [] for anything else."""
+    """The numbers of a list, or one number as a list; [] for anything else."""
     values = value if isinstance(value, list) else [value]
     return list(values) if values and all(map(is_number, values)) else []
 
 
-def _breakaway(place: KeyPath, static: Any, level: Any, key: str) -> KeyMessages:
+def _breakaway_fault(place: KeyPath, static: Any, level: Any, key: str) -> KeyMessages:
     """Path and sentence of a friction at rest (`static`) that is below that in sliding (`level`, given by `key`),
     or that stands beside a sliding friction of 0."""
     if not (is_number(static) and is_number(level)) or static < 0 or level < 0:
@@ -135,12 +139,15 @@ def _breakaway(place: KeyPath, static: Any, level: Any, key: str) -> KeyMessages
         yield place, f"must be at least {key} = {level:.10g}, got {static:.10g}"
 
 
-def _grip(
+def _friction_model_faults(
     place: KeyPath, section: dict[str, Any], rubs: bool, above: bool, per_metre: str, speed: str
 ) -> KeyMessages:
-    """What a model reads, and what it needs.
+    """Path and sentence of keys of a friction section that its model does not read, or lacks.
 
-    above  is there a breakaway above the level of sliding?
+    place             path of the section
+    rubs              whether any sliding friction is above 0
+    above             whether any friction at rest is above that of sliding
+    per_metre, speed  how the names of the bristles' stiffness and of the Stribeck velocity end, with their units
     """
     model = section.get("model", "coulomb")
     if model not in MODELS:
@@ -167,7 +174,7 @@ def _drive_friction(document: Document) -> KeyMessages:
     mechanism = table(document, "mechanism")
     section = table(mechanism, "friction")
     model = section.get("model", "coulomb")
-    rubs = above = False
+    rubs = breaks_above = False
     for index, drive in tables(mechanism, "drives"):
         level, static = drive.get("coulomb_Nm"), drive.get("breakaway_Nm")
         place: KeyPath = ("mechanism", "drives", index, "breakaway_Nm")
@@ -182,19 +189,21 @@ def _drive_friction(document: Document) -> KeyMessages:
         elif "coulomb_Nm" not in drive:
             yield place, "needs coulomb_Nm beside it, the level when sliding; give that or remove this"
         else:
-            yield from _breakaway(place, static, level, "coulomb_Nm")
-            above |= is_number(static) and is_number(level) and static > level > 0
+            yield from _breakaway_fault(place, static, level, "coulomb_Nm")
+            breaks_above |= is_number(static) and is_number(level) and static > level > 0
     if section and not any("coulomb_Nm" in drive for _, drive in tables(mechanism, "drives")):
         yield (
             ("mechanism", "friction"),
             "describes dry friction, but no drive has coulomb_Nm; give it, or remove this table",
         )
         return
-    yield from _grip(("mechanism", "friction"), section, rubs, above, "_Nm_per_rad", "_rad_per_s")
+    yield from _friction_model_faults(
+        ("mechanism", "friction"), section, rubs, breaks_above, "_Nm_per_rad", "_rad_per_s"
+    )
 
 
 def _flexible_transmission(document: Document) -> KeyMessages:
-    """Springs that are not straight are those of a flexible transmission."""
+    """Path and sentence of hardening or backward stiffness of drives whose transmission is rigid."""
     for index, drive in tables(table(document, "mechanism"), "drives"):
         if is_number(stiffness := drive.get("stiffness_Nm_per_rad", inf)) and stiffness in (inf, -inf):
             for key in ("hardening_Nm_per_rad3", "backward_stiffness_Nm_per_rad"):
@@ -206,15 +215,15 @@ def _flexible_transmission(document: Document) -> KeyMessages:
 DRIVES: Final = "mechanism.drives.*"
 BACKWARD: Final = "backward_stiffness_Nm_per_rad"
 BRAKE: Final = "brake_damping_max_Nms_per_rad"
-PLANT: Final[tuple[Rule, ...]] = (_plant,)
+PLANT: Final[tuple[Rule, ...]] = (_plant_sizes,)
 # fmt: off
 MOTION: Final[tuple[Rule, ...]] = (
-    _reading,
+    _unread_encoder_keys,
     KeyRule("", "friction", "friction mechanism", "",
             "is for a [plant]; the drives of a mechanism give coulomb_Nm, and [mechanism.friction] how it grips"),
     KeyRule("", "friction", "friction response", "mechanism", NOT_MEASURED),
-    _friction,
-    _along,
+    _plant_friction,
+    _along_lengths,
     KeyRule("plant.spring.*", "", "", "hardening_N_per_m3 backward_excess_N_per_m",
             "is an ordinary spring; give hardening_N_per_m3 or backward_excess_N_per_m, or move it to "
             "stiffness_N_per_m"),
@@ -255,7 +264,8 @@ def _winding_resistance(drive: Numbers) -> Any:
 
 
 def _joint_constant(drive: Numbers) -> Any:
-    """Torque of a drive at its joint per current in its winding [N m/A]; nan where a factor is faulty."""
+    """Torque of a drive at its joint per current in its winding [N m/A], of a ratio table at its largest ratio;
+    None where a factor is not given, nan where one is faulty."""
     ratios, k = drive.numbers("ratio_table.ratio"), drive.number("torque_constant_Nm_per_A")
     n = drive.number("transmission_ratio") if ratios is None else np.max(np.asarray(ratios, dtype=float), axis=-1)
     if n is None or k is None:
@@ -264,30 +274,39 @@ def _joint_constant(drive: Numbers) -> Any:
 
 
 def _brakes_too_much(R: Any, k: Any) -> Any:
-    """Whether the damping k^2/R is more than that of any device."""
+    """Whether the damping k^2/R of windings is more than that of any device; resistance R [ohm], k [N m/A] or
+    [N/A]."""
     return _usable(k) & _usable(R) & (k * k / R > STRONGEST_DAMPING)
 
 
 def _damping_sentence(R: float, k: float) -> str:
+    """What is wrong with a winding of resistance R [ohm] and force or torque per current k."""
     return f"has an electrical damping of {k**2 / R:.4g}, more than any device; are the units right?"
 
 
 def _winding_lags_wrongly(L: Any, R: Any, T: Any) -> Any:
-    """Whether the time constant L/R is neither 0 nor that of any device."""
+    """Whether time constants L/R of windings are neither 0 nor those of any device: L [H], R [ohm], sampling
+    period T [s]."""
     return _usable(L) & _usable(R) & lags_wrongly(L / R, T)
 
 
 def _winding_lag_sentence(L: float, R: float, T: float) -> str:
+    """What is wrong with a winding of inductance L [H] and resistance R [ohm] at a sampling period T [s]."""
     got = f"{L:.10g} H, {L / R:.4g} s"
     return f"must be 0 or give a time constant L/R {lags_allowed(T)}, got {got}; is the unit right?"
 
 
-def _winding_rules(place: str, constant: Read, resistance: Read, L: str) -> tuple[Rule, ...]:
-    """The rules of a winding that brakes: its constant k, its resistance R, its inductance."""
-    lag = (L, resistance, Numbers.period)
+def _winding_rules(place: str, constant: Read, resistance: Read, inductance: str) -> tuple[Rule, ...]:
+    """The rules of a winding that brakes.
+
+    place                 dotted path of its table
+    constant, resistance  read force or torque per current k, and resistance R, of the table
+    inductance            key of its inductance
+    """
+    lag = (inductance, resistance, Numbers.period)
     return (
         NumberRule(place, "", (resistance, constant), _brakes_too_much, _damping_sentence),
-        NumberRule(place, L, lag, _winding_lags_wrongly, _winding_lag_sentence),
+        NumberRule(place, inductance, lag, _winding_lags_wrongly, _winding_lag_sentence),
     )
 
 
@@ -306,7 +325,11 @@ WINDINGS: Final[tuple[Rule, ...]] = (
 
 
 def grasp_faults(section: str, held: dict[str, Any], says_not: str) -> KeyMessages:
-    """One way of holding the handle, in [operator] or [arm]; what to say where there is none."""
+    """Path and sentence where the handle is held in two ways, or none.
+
+    section   "operator" or "arm";   held  its table
+    says_not  what to say that it leaves open, where it names no way
+    """
     elastic = [key for key in ELASTIC if key in held]
     if "grasp" in held and elastic:
         yield (section, "grasp"), f"stands beside {' and '.join(elastic)}; only one way is allowed: remove one"
@@ -315,7 +338,8 @@ def grasp_faults(section: str, held: dict[str, Any], says_not: str) -> KeyMessag
 
 
 def operator_faults(document: Document) -> KeyMessages:
-    """A handle to hold, one way of holding it, and a mass where the grasp is elastic."""
+    """Path and sentence of an operator without a handle to hold, of several ways of holding it or none, and of an
+    elastic grasp without a mass behind it."""
     operator, plant = table(document, "operator"), table(document, "plant")
     size = row_count(plant.get("mass_kg"))
     if "operator" in document and size is not None and size > 1 and "handle" not in plant:

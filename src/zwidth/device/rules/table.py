@@ -130,7 +130,8 @@ def certainly_valid(document: Document, values: Values, count: int) -> Flags:
 
 
 def _broken_rules(designs: Numbers) -> Iterator[Any]:
-    """Whether each design breaks each of the rules about numbers."""
+    """For each rule about numbers and each place that it is about: whether each design breaks it, (count,), or ()
+    where they are alike."""
     for rule in RULES:
         if isinstance(rule, NumberRule):
             where = places(designs.document, rule.place)
@@ -138,20 +139,26 @@ def _broken_rules(designs: Numbers) -> Iterator[Any]:
 
 
 def _broken_together(designs: Numbers, together: dict[KeyPath, Any]) -> Iterator[Any]:
-    """Whether the vectors and matrices of each design break the rules of their types."""
+    """For each rule about a vector or matrix whose numbers differ: whether each design breaks it, (count,).
+
+    together  path -> type of the vectors and matrices of the file
+    """
     for path, kind in together.items():
         if any(steps[: len(path)] == path for steps in designs.values):
             rules = [rule.func for rule in kind.__metadata__ if isinstance(rule, AfterValidator)]
-            value = _array(designs, path, kind in VECTORS)
+            value = _vectors_or_matrices(designs, path, kind in VECTORS)
             yield np.abs(value).max(axis=-1 if kind in VECTORS else (-2, -1)) > LARGEST
             yield from (rule.judge(value)[0] for rule in rules if isinstance(rule, ValueRule))
 
 
-def _array(designs: Numbers, path: KeyPath, vector: bool) -> Floats:
-    """The vectors (..., n) or matrices (..., n, n) of designs at a path, where one number may stand for either and
-    three moments for a matrix."""
+def _vectors_or_matrices(designs: Numbers, path: KeyPath, vector: bool) -> Floats:
+    """Numbers of designs at a path, where one number may stand for a vector or matrix and three moments for a
+    matrix.
+
+    vector  True: vectors (..., n); False: matrices (..., n, n)
+    """
     own = Numbers(designs.document, path, designs.values)
-    held = own.held("")
+    held = own.held("")  # the value at the path itself
     if not isinstance(held, list):
         return np.asarray(own.number(""), dtype=float)[(..., None) if vector else (..., None, None)]
     if isinstance(held[0], list):
@@ -162,9 +169,10 @@ def _array(designs: Numbers, path: KeyPath, vector: bool) -> Floats:
 
 
 def _allowed_alone(document: Document, steps: KeyPath, numbers: Floats) -> Flags:
-    """Which numbers the file may have at a path. Those between two that it may have are allowed, too, if they are
-    of one sign and not infinite."""
+    """Marks (count,) of the numbers that the file may have at a path. Those between two that it may have are
+    allowed, too, if they are of one sign and not infinite."""
     inside = np.zeros(len(numbers), dtype=bool)
+    # marks of the numbers of one sign, of 0 and of inf
     for part in (numbers < 0.0, numbers == 0.0, (numbers > 0.0) & np.isfinite(numbers), np.isposinf(numbers)):
         ordered = np.unique(numbers[part])
         if not len(ordered):
@@ -174,7 +182,7 @@ def _allowed_alone(document: Document, steps: KeyPath, numbers: Floats) -> Flags
         def allowed(place: int, ordered: Floats = ordered, known: dict[int, bool] = known) -> bool:
             """Whether the file may have the number at a place among the ordered ones; each is tried once."""
             if place not in known:
-                known[place] = _may_be(document, steps, float(ordered[place]))
+                known[place] = _takes_number(document, steps, float(ordered[place]))
             return known[place]
 
         low, high = _allowed_range(allowed, len(ordered))
@@ -184,7 +192,12 @@ def _allowed_alone(document: Document, steps: KeyPath, numbers: Floats) -> Flags
 
 
 def _allowed_range(allowed: Callable[[int], bool], count: int) -> tuple[int, int]:
-    """First and last place that is allowed, of places that are so from one to another; (0, -1) where none is."""
+    """First and last place that is allowed, of places 0 to count - 1 that are so from one to another; (0, -1)
+    where none is.
+
+    allowed  whether a place is; asked as rarely as may be
+    """
+    # the ends, then places spread evenly, then all
     tried = [0, count - 1, *(count * share // 16 for share in range(1, 16)), *range(count)]
     good = next((place for place in tried if allowed(place)), None)
     if good is None:
@@ -194,6 +207,7 @@ def _allowed_range(allowed: Callable[[int], bool], count: int) -> tuple[int, int
         inside, outside = good, end
         if allowed(end):
             inside = outside
+        # halve the way from a place that is allowed to one that is not
         while abs(outside - inside) > 1:
             middle = (inside + outside) // 2
             inside, outside = (middle, outside) if allowed(middle) else (inside, middle)
@@ -201,8 +215,8 @@ def _allowed_range(allowed: Callable[[int], bool], count: int) -> tuple[int, int
     return ends[0], ends[1]
 
 
-def _may_be(document: Document, steps: KeyPath, number: float) -> bool:
-    """Whether the types of a file take a number at a path."""
+def _takes_number(document: Document, steps: KeyPath, number: float) -> bool:
+    """Whether the types of a file take a number at a path of a document."""
     changed = deep_copy(document)
     place: Any = changed
     for step in steps[:-1]:
@@ -234,7 +248,7 @@ def without_unsupported(document: dict[str, Any]) -> tuple[dict[str, Any], list[
     document = deep_copy(document)
     refused: list[tuple[KeyPath, str]] = []
     for pattern, (names, stand_in, beside) in UNSUPPORTED_VALUES.items():
-        for path, holder in _places(document, pattern):
+        for path, holder in _keys_matching(document, pattern):
             value = holder[pattern[-1]]
             if isinstance(value, str) and value.lower() in names:
                 for key in [] if beside is None else holder.keys() - beside:
@@ -244,16 +258,16 @@ def without_unsupported(document: dict[str, Any]) -> tuple[dict[str, Any], list[
     return document, refused
 
 
-def _places(
+def _keys_matching(
     document: Any, pattern: tuple[str, ...], path: KeyPath = ()
 ) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
     """Path of each key that a pattern (* for each list element) leads to, and the table that holds it."""
     first, rest = pattern[0], pattern[1:]
     if first == "*":
         for index, inner in enumerate(document if isinstance(document, list) else []):
-            yield from _places(inner, rest, (*path, index))
+            yield from _keys_matching(inner, rest, (*path, index))
     elif isinstance(document, dict) and first in document:
         if not rest:
             yield (*path, first), document
         else:
-            yield from _places(document[first], rest, (*path, first))
+            yield from _keys_matching(document[first], rest, (*path, first))

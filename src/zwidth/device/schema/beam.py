@@ -64,7 +64,7 @@ class MaterialSection(Section):
 
 
 def _given_by(value: Any) -> str:
-    """Whether a material is given by its numbers or by its name."""
+    """Return "numbers" for a material that is given by its numbers, "name" for one by its name."""
     return "numbers" if isinstance(value, dict | MaterialSection) else "name"
 
 

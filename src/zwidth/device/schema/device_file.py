@@ -36,13 +36,14 @@ TAGS: Final = ("type", "method", "shape")  # of a filter, of a velocity's estima
 
 
 def flat_sources(value: Any) -> Any:
-    """[sources] with dotted keys written bare (nested tables for TOML) or quoted: one level either way."""
+    """[sources] as one level, dotted path -> text: dotted keys written bare, which are nested tables for TOML, are
+    joined; quoted ones are so already. What is no table stays as it is."""
     if not isinstance(value, dict):
         return value
     flat: dict[str, Any] = {}
     for key, inner in value.items():
         if isinstance(inner, dict) and inner:
-            flat |= {f"{key}.{rest}": text for rest, text in flat_sources(inner).items()}
+            flat |= {f"{key}.{below}": text for below, text in flat_sources(inner).items()}
         else:
             flat[key] = inner
     return flat
@@ -91,13 +92,16 @@ def schema() -> dict[str, Any]:
 def subschemas(path: tuple[str | int, ...], document: dict[str, Any] | None = None) -> list[dict[str, Any]]:
     """Every subschema that may describe the value at a path of keys and indices; none: no such key.
 
-    document  a device's: of a table that comes in kinds, only that of the kind that the document has there
+    document  a device's: of a table that comes in kinds, only that of the kind that the document has there; None:
+              those of all kinds
     """
     alternatives, place = list(_alternatives(schema())), document
     for part in path:
-        tables = [outer for outer in alternatives if _of_kind(outer, place)]
-        alternatives = [inner for outer in tables for step in _step(outer, part) for inner in _alternatives(step)]
-        place = _inside(place, part)
+        tables = [outer for outer in alternatives if _is_of_kind(outer, place)]
+        alternatives = [
+            inner for outer in tables for step in _schemas_at(outer, part) for inner in _alternatives(step)
+        ]
+        place = _value_at(place, part)
     return alternatives
 
 
@@ -109,8 +113,8 @@ def keys(path: tuple[str | int, ...]) -> set[str]:
 
 
 def kinds(path: tuple[str | int, ...]) -> tuple[str, dict[str, set[str]]]:
-    """For a table that comes in kinds: the key that tells them apart, and the keys of each kind; "", {} for any
-    other."""
+    """For a table that comes in kinds, such as filters: the key that tells them apart, and kind -> keys that it
+    reads; "", {} for any other."""
     tables = [subschema.get("properties", {}) for subschema in subschemas(path)]
     for tag in TAGS:
         keys_by_kind = {table[tag]["const"]: set(table) for table in tables if "const" in table.get(tag, {})}
@@ -122,11 +126,14 @@ def kinds(path: tuple[str | int, ...]) -> tuple[str, dict[str, set[str]]]:
 def key_sentence(path: tuple[str | int, ...]) -> str:
     """What the key at a path means, or the list that it stands in; "" if the schema says nothing."""
     for end in range(len(path), 0, -1):
-        outer = [step for subschema in subschemas(path[: end - 1]) for step in _step(subschema, path[end - 1])]
+        outer = [
+            step for subschema in subschemas(path[: end - 1]) for step in _schemas_at(subschema, path[end - 1])
+        ]
+        # an element has the sentence of its list, and an entry of free name that of its table
         for subschema in outer:
             if "description" in subschema:
                 return str(subschema["description"])
-        if outer and isinstance(path[end - 1], str) and not _free(path[: end - 1]):
+        if outer and isinstance(path[end - 1], str) and not _takes_any_key(path[: end - 1]):
             break
     return ""
 
@@ -139,13 +146,16 @@ def key_description(path: tuple[str | int, ...]) -> str:
 
 @cache
 def key_unit(path: tuple[str | int, ...]) -> str:
-    """The unit of the number at a path, or of the list that it stands in; "" if the schema states none."""
+    """The unit of the number at a path, or of the list that it stands in; "" if the schema states none, and for
+    "1"."""
     for end in range(len(path), 0, -1):
-        outer = [step for subschema in subschemas(path[: end - 1]) for step in _step(subschema, path[end - 1])]
+        outer = [
+            step for subschema in subschemas(path[: end - 1]) for step in _schemas_at(subschema, path[end - 1])
+        ]
         units = [str(subschema["unit"]) for subschema in outer if "unit" in subschema]
         if units:
             return "" if units[0] == "1" else units[0]
-        if isinstance(path[end - 1], str):
+        if isinstance(path[end - 1], str):  # a key, no index: no list around it
             break
     return ""
 
@@ -157,8 +167,8 @@ def usual_size(path: tuple[str | int, ...]) -> float:
     >>> usual_size(("loop", "delay_samples")), usual_size(("loop", "sampling_period_s"))
     (1.0, 0.0)
     """
-    outer = [step for subschema in subschemas(path[:-1]) for step in _step(subschema, path[-1])]
-    return next((float(one["usual"]) for one in outer if "usual" in one), 0.0)
+    outer = [step for subschema in subschemas(path[:-1]) for step in _schemas_at(subschema, path[-1])]
+    return next((float(subschema["usual"]) for subschema in outer if "usual" in subschema), 0.0)
 
 
 def may_be_zero(path: tuple[str | int, ...]) -> bool:
@@ -167,8 +177,9 @@ def may_be_zero(path: tuple[str | int, ...]) -> bool:
     >>> may_be_zero(("loop", "delay_samples")), may_be_zero(("loop", "sampling_period_s"))
     (True, False)
     """
-    numbers = [one for one in subschemas(path) if one.get("type") == "number"]
-    return any(one.get("ge", one.get("minimum")) == 0 for one in numbers)
+    numbers = [subschema for subschema in subschemas(path) if subschema.get("type") == "number"]
+    # the limit as pydantic writes it for numbers with checks of their own, or as JSON Schema does
+    return any(subschema.get("ge", subschema.get("minimum")) == 0 for subschema in numbers)
 
 
 def zero_is_none(path: tuple[str | int, ...]) -> bool:
@@ -178,6 +189,7 @@ def zero_is_none(path: tuple[str | int, ...]) -> bool:
     >>> zero_is_none((*drive, "coulomb_Nm")), zero_is_none((*drive, "damping_resistance_ohm"))
     (True, False)
     """
+    # what follows "omitted: " is another thing than none, such as "not known" or the value of another key
     return not re.search(r"omitted[^:;]*: (?!none\b|no\b|0\b)", key_sentence(path))
 
 
@@ -186,8 +198,8 @@ def default(path: tuple[str | int, ...], document: dict[str, Any] | None = None)
 
     document  as for `subschemas`
     """
-    outer = [step for subschema in subschemas(path[:-1], document) for step in _step(subschema, path[-1])]
-    return next((one["default"] for one in outer if one.get("default") is not None), None)
+    outer = [step for subschema in subschemas(path[:-1], document) for step in _schemas_at(subschema, path[-1])]
+    return next((subschema["default"] for subschema in outer if subschema.get("default") is not None), None)
 
 
 def mirror_image(path: tuple[str | int, ...]) -> tuple[str | int, ...] | None:
@@ -210,27 +222,27 @@ def below_diagonal(path: tuple[str | int, ...]) -> bool:
     return mirror_image(path) is not None and int(path[-2]) > int(path[-1])
 
 
-def _free(path: tuple[str | int, ...]) -> bool:
-    """Whether the table at a path takes keys of any name, as assemblies do."""
+def _takes_any_key(path: tuple[str | int, ...]) -> bool:
+    """Whether the table at a path takes keys of any name, as [mechanism.assemblies] does."""
     return any(isinstance(subschema.get("additionalProperties"), dict) for subschema in subschemas(path))
 
 
-def _of_kind(subschema: dict[str, Any], table: Any) -> bool:
+def _is_of_kind(subschema: dict[str, Any], table: Any) -> bool:
     """Whether a table has the tag (type, method, ...) that a subschema demands; true where it demands none."""
     properties = subschema.get("properties", {}) if isinstance(table, dict) else {}
     tags = [(tag, properties[tag]) for tag in TAGS if "const" in properties.get(tag, {})]
-    return all(one["const"] == table.get(tag, one.get("default")) for tag, one in tags)
+    return all(tag_schema["const"] == table.get(tag, tag_schema.get("default")) for tag, tag_schema in tags)
 
 
-def _inside(place: Any, part: str | int) -> Any:
+def _value_at(place: Any, part: str | int) -> Any:
     """The value of a document's table or list at a key or index; None where there is none."""
     if isinstance(place, dict):
         return place.get(str(part))
     return place[part] if isinstance(place, list) and isinstance(part, int) and part < len(place) else None
 
 
-def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
-    """The JSON Schema of what stands at a key or index below a schema; nothing where it allows none."""
+def _schemas_at(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
+    """The schema, if there is one, of what stands at a key or index of what a schema describes."""
     if isinstance(part, int):
         if isinstance(subschema.get("items"), dict):
             yield subschema["items"]
@@ -245,7 +257,10 @@ def _alternatives(subschema: dict[str, Any]) -> Iterator[dict[str, Any]]:
     if "$ref" in subschema:
         yield from _alternatives(schema()["$defs"][subschema["$ref"].removeprefix("#/$defs/")])
         return
-    branches = subschema.get("anyOf", []) + [b for b in subschema.get("oneOf", []) if "required" not in b]
+    # a oneOf of "required" alone says which keys exclude each other, and is no form of its own
+    branches = subschema.get("anyOf", []) + [
+        branch for branch in subschema.get("oneOf", []) if "required" not in branch
+    ]
     if not branches or "properties" in subschema:
         yield subschema
     for branch in branches:

@@ -74,18 +74,22 @@ class _Method(Section):
     filter: LowPass | None = documented_key("low pass on the velocity; omitted: none", default=None)
 
     @model_validator(mode="after")
-    def _can_be_built(self) -> Self:
-        """The section itself. Raises ValueError where its parameters make no estimator."""
-        own = self.parameters()
-        if None not in own.values():
-            METHODS[self.method](**own)
+    def _check_parameters(self) -> Self:
+        """The section itself. Raises ValueError where its parameters make no estimator; with one left out, as a
+        noise in whose place the encoder's step stands, nothing is checked."""
+        given = self.parameters()
+        if None not in given.values():
+            METHODS[self.method](**given)
         return self
 
     def parameters(self) -> dict[str, Any]:
-        """The estimator's parameters under their names in Python; None where not given."""
+        """The estimator's parameters under their names in Python, without the unit; None where not given."""
         units = ("_m_per_s2", "_m")
-        own = {key: value for key, value in self if key not in ("method", "filter")}
-        return {next((key.removesuffix(u) for u in units if key.endswith(u)), key): own[key] for key in own}
+        given = {key: value for key, value in self if key not in ("method", "filter")}
+        return {
+            next((key.removesuffix(unit) for unit in units if key.endswith(unit)), key): given[key]
+            for key in given
+        }
 
 
 class BackwardDifferenceSection(_Method):
@@ -190,8 +194,9 @@ class LevantSection(_Method):
     )
 
 
-def _method(table: Any) -> Any:
-    """Name of the velocity method of a table or section, the default where it has none; None if no text."""
+def _method_name(table: Any) -> Any:
+    """Name of the velocity method of a table or section, the default where it has none; None where it is no
+    text."""
     method = (
         table.get("method", DEFAULT_METHOD)
         if isinstance(table, dict)
@@ -210,7 +215,7 @@ VelocitySection = Annotated[
     | Annotated[KalmanSection, Tag("kalman")]
     | Annotated[FoawSection, Tag("foaw")]
     | Annotated[LevantSection, Tag("levant")],
-    Discriminator(_method),
+    Discriminator(_method_name),
 ]
 
 
@@ -219,13 +224,13 @@ LONGEST_PERIOD: Final = 1.0  # s
 LONGEST_DELAY: Final = 100  # samples; each adds a state to the loop
 
 
-def _a_period(value: Any) -> Any:
+def _possible_period(value: Any) -> Any:
     """The value itself. Raises ValueError for a sampling period above 1 s, which may be a frequency in Hz, or
     below 1e-7 s, in which rounding hides the plant's motion; what is no number is left to other checks."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return value
     allowed = f"must be {SHORTEST_PERIOD:g} <= T <= {LONGEST_PERIOD:g} s, got {quote(value)}"
-    if LONGEST_PERIOD < value < 1e9:
+    if LONGEST_PERIOD < value < 1e9:  # above, no frequency either: the key's own limit refuses it
         raise ValueError(f"{allowed}; is {value:.10g} a frequency in Hz? then T = {1 / value:.6g}")
     if 0 < value < SHORTEST_PERIOD:
         raise ValueError(
@@ -282,7 +287,7 @@ class SaturationSection(Section):
 class LoopSection(Section):
     """The sampled wall law, f = -F (K y + B v)."""
 
-    sampling_period_s: Annotated[value_types.Number, BeforeValidator(_a_period)] | None = documented_key(
+    sampling_period_s: Annotated[value_types.Number, BeforeValidator(_possible_period)] | None = documented_key(
         "sampling period T, 1e-7 <= T <= 1; omitted, of a [mechanism]: not known, which leaves answers without a "
         "computer",
         "s",
