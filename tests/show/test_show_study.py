@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection, QuadMesh
 
 from zwidth.measures import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS
 from zwidth.show import save
-from zwidth.show.figures.study import _lines, study_figure
+from zwidth.show.figures.study import _in_lines, study_figure
 
 LENGTHS, PERIODS, NAMES = np.linspace(0.1, 0.2, 5), np.geomspace(1e-4, 1e-2, 4), ["out", "in", "left"]
 KEYS = {"length_m": ("length_m", LENGTHS, "m", "linear"), "period_s": ("period_s", PERIODS, "s", "log")}
@@ -225,8 +225,8 @@ def test_the_same_bytes_from_the_same_numbers(tmp_path):
 
 
 def test_names_of_uprights_fit_between_them():
-    assert _lines("links.upper-right.length_m [m]") == "links.\nupper-right.\nlength_m [m]"
-    assert _lines("Largest virtual stiffness [kN/m]") == "Largest virtual\nstiffness [kN/m]"
+    assert _in_lines("links.upper-right.length_m [m]") == "links.\nupper-right.\nlength_m [m]"
+    assert _in_lines("Largest virtual stiffness [kN/m]") == "Largest virtual\nstiffness [kN/m]"
 
 
 def test_values_listed_in_any_order_are_drawn_in_theirs():

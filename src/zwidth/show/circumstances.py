@@ -44,16 +44,17 @@ def computer_text(controller: Controller, varied: Sequence[str] = ()) -> str:
 
     varied  paths of the device file that have no one value, which is left out
     """
-    own = [path.removeprefix("loop.") for path in varied if path.startswith("loop.")]
+    loop_keys = [path.removeprefix("loop.") for path in varied if path.startswith("loop.")]
     parts = []
-    if "sampling_period_s" not in own:
+    if "sampling_period_s" not in loop_keys:
         known = math.isfinite(controller.sampling_period)
-        period = _given(controller.sampling_period, "s")
+        period = _given_text(controller.sampling_period, "s")
         parts.append(f"sampled every {period}" if known else "sampling period not known")
-    if not any(key.startswith("delay") for key in own):
+    if not any(key.startswith("delay") for key in loop_keys):
         samples = "sample" if controller.delay == 1.0 else "samples"
-        parts.append(f"{_given(controller.delay)} {samples} of delay" if controller.delay else "no delay")
-    if all(key == "sampling_period_s" or key.startswith("delay") for key in own):
+        parts.append(f"{_given_text(controller.delay)} {samples} of delay" if controller.delay else "no delay")
+    # whatever else of the loop is varied is a part of the wall law, which is then left out as a whole
+    if all(key == "sampling_period_s" or key.startswith("delay") for key in loop_keys):
         parts += wall_law_parts(controller)
     return ", ".join(parts)
 
@@ -76,7 +77,7 @@ def wall_law_parts(controller: Controller, *, spell_out: bool = False) -> list[s
             if value is True
             else value
             if isinstance(value, str)
-            else f"{key.replace('_', ' ')} {_given(value)}"
+            else f"{key.replace('_', ' ')} {_given_text(value)}"
             for key, value in vars(controller.velocity).items()
             if value is not False
         )
@@ -84,26 +85,26 @@ def wall_law_parts(controller: Controller, *, spell_out: bool = False) -> list[s
     if controller.velocity_filter is None:
         parts.append(f"{estimate} not filtered" if spell_out or estimate == "velocity" else estimate)
     else:
-        parts.append(f"{estimate} through {_filter(controller.velocity_filter)}")
+        parts.append(f"{estimate} through {_filter_text(controller.velocity_filter)}")
     if controller.force_filter is not None:
-        parts.append(f"force through {_filter(controller.force_filter)}")
+        parts.append(f"force through {_filter_text(controller.force_filter)}")
     if controller.actuator_time_constant:
-        parts.append(f"force lagging by {_given(controller.actuator_time_constant, 's')}")
+        parts.append(f"force lagging by {_given_text(controller.actuator_time_constant, 's')}")
     return parts + [f"with {name}" for name in controller.feedback_texts(speaks_of_moments())]
 
 
-def _filter(low_pass: FirstOrder | Butterworth) -> str:
+def _filter_text(low_pass: FirstOrder | Butterworth) -> str:
     """A low-pass filter in words: its order, and its time constant or cutoff frequency."""
     from zwidth.loop.controller import FirstOrder
 
     if isinstance(low_pass, FirstOrder):
-        return f"a first-order filter of {_given(low_pass.time_constant, 's')}"
+        return f"a first-order filter of {_given_text(low_pass.time_constant, 's')}"
     kind = f"a Butterworth filter of order {low_pass.order}"
-    return f"{kind} at {_given(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
+    return f"{kind} at {_given_text(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
 
 
-def _given(value: float, unit: str = "") -> str:
-    """A number of the device file as it was written there, with its unit."""
+def _given_text(value: float, unit: str = "") -> str:
+    """A number of the device file as it was written there, with its unit, in signs that can be typed."""
     return typed(as_written(value, unit))
 
 

@@ -92,7 +92,9 @@ def _matlab(draft: Path, dataset: xr.Dataset) -> None:
     """Write the dataset as a MAT file, with a header that does not change from day to day."""
     from scipy.io import savemat
 
-    arrays: dict[str, Any] = {_matlab_name(str(name)): _cells(v.values) for name, v in dataset.variables.items()}
+    arrays: dict[str, Any] = {
+        _matlab_name(str(name)): _matlab_values(v.values) for name, v in dataset.variables.items()
+    }
     about = {
         _matlab_name(str(name)): _struct({"axes": " ".join(map(str, v.dims)), **v.attrs})
         for name, v in dataset.variables.items()
@@ -117,7 +119,7 @@ def _matlab_name(name: str) -> str:
     return plain
 
 
-def _cells(values: np.ndarray) -> np.ndarray:
+def _matlab_values(values: np.ndarray) -> np.ndarray:
     """The array as MATLAB takes it: texts as objects, which become a cell array."""
     return values.astype(object) if values.dtype.kind in "UT" else values
 
@@ -132,7 +134,7 @@ Columns = Mapping[str, Sequence[Any]]
 def write_sweep_csv(path: Path, sweep: Sweep, renamed: Callable[[Any], Any] = dict) -> None:
     """Write a study's designs as a table, one a row, whole or not at all.
 
-    renamed  gives the columns of a piece the names that they have in the file
+    renamed  takes the columns of a piece, name -> values, and returns them under the names of the file
     Raises   OutputError  where the file cannot be written
     """
     with replacing(path) as draft, open(draft, "w", encoding="utf-8", newline="\n") as file:
@@ -156,13 +158,13 @@ def write_sweep_zarr(path: Path, sweep: Sweep) -> None:
     import zarr
 
     with new_folder(path) as draft:
-        listed = sweep.job.sampling.kind == "grid"
-        along = coordinates(sweep, 0, 0 if not listed else sweep.job.count) if listed else {}
+        is_grid = sweep.job.sampling.kind == "grid"
+        along = coordinates(sweep, 0, 0 if not is_grid else sweep.job.count) if is_grid else {}
         xr.Dataset(coords=along, attrs=dataset_attributes(sweep)).to_zarr(
             draft, mode="w", zarr_format=2, consolidated=False
         )
         group = zarr.open_group(str(draft), mode="r+", zarr_format=2)
-        if not listed:
+        if not is_grid:
             _write_coordinates(group, sweep)
         _write_columns(group, sweep)
         zarr.consolidate_metadata(str(draft), zarr_format=2)
@@ -182,7 +184,7 @@ def _write_columns(group: Any, sweep: Sweep) -> None:
         status = _array(group, f"{one.name}_status", shape, chunks, np.dtype(np.uint8), None, dims, flags)
         arrays.append((values, status))
     pieces = ((np.asarray(cells.values), np.asarray(cells.status)) for _, cells in sweep.cells.pieces())
-    cut = _cut(pieces, _lengths(shape, chunks))
+    cut = _recut(pieces, _lengths(shape, chunks))
     for place, (values, status) in zip(_places(shape, chunks), cut, strict=True):
         size = tuple(part.stop - part.start for part in place)
         for n, (array_of_values, array_of_status) in enumerate(arrays):
@@ -200,7 +202,7 @@ def _write_coordinates(group: Any, sweep: Sweep) -> None:
     # texts are as long as the longest: of listed values all are looked at
     for axis in sweep.job.sampling.axes:
         if axis.values and types[axis.key].kind == "U":
-            lengths = [len(str(text)) for part in _blocks(sweep, axis.key) for text in part]
+            lengths = [len(str(text)) for part in _values_by_chunk(sweep, axis.key) for text in part]
             types[axis.key] = np.dtype(f"<U{max(lengths)}")
     arrays: dict[str, Any] = {}
     for first in range(0, count, CHUNK):
@@ -221,10 +223,11 @@ def _coordinates_of(sweep: Sweep, first: int, last: int) -> Iterator[tuple[str, 
         yield name, values, attributes[0] if attributes else {}
 
 
-def _blocks(sweep: Sweep, name: str) -> Iterator[Any]:
-    """The values of one axis, CHUNK designs at a time."""
+def _values_by_chunk(sweep: Sweep, name: str) -> Iterator[Any]:
+    """The values of the axis `name`, CHUNK designs at a time."""
     for first in range(0, sweep.job.count, CHUNK):
-        yield coordinates(sweep, first, min(first + CHUNK, sweep.job.count))[name][1]
+        _, values, *_ = coordinates(sweep, first, min(first + CHUNK, sweep.job.count))[name]
+        yield values
 
 
 def _array(
@@ -263,12 +266,15 @@ def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _places(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Where each chunk lies, in the order of the designs."""
+    """Slices of each chunk, one along each axis, in the order of the designs.
+
+    shape, chunks  places of the array and of a whole chunk, along each axis
+    """
     counts = tuple(-(-length // chunk) for length, chunk in zip(shape, chunks, strict=True))
-    for place in np.ndindex(counts):
+    for chunk_index in np.ndindex(counts):
         yield tuple(
-            slice(at * chunk, min((at + 1) * chunk, length))
-            for at, chunk, length in zip(place, chunks, shape, strict=True)
+            slice(index * chunk, min((index + 1) * chunk, length))
+            for index, chunk, length in zip(chunk_index, chunks, shape, strict=True)
         )
 
 
@@ -277,13 +283,16 @@ def _lengths(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[int]:
     return (prod(part.stop - part.start for part in place) for place in _places(shape, chunks))
 
 
-def _cut(pieces: Iterable[tuple[Any, Any]], lengths: Iterable[int]) -> Iterator[tuple[Any, Any]]:
-    """Cut consecutive rows of two arrays, given in pieces, into parts of these lengths."""
+def _recut(pieces: Iterable[tuple[Any, Any]], lengths: Iterable[int]) -> Iterator[tuple[Any, Any]]:
+    """Cut consecutive rows of two arrays, given in pieces, into parts of these lengths.
+
+    pieces  pairs of rows of the values and as many of the status; yielded are such pairs, each of one length
+    """
     coming = iter(pieces)
-    held: list[tuple[Any, Any]] = []
+    pending: list[tuple[Any, Any]] = []
     for length in lengths:
-        while sum(len(values) for values, _ in held) < length:
-            held.append(next(coming))
-        values, status = (np.concatenate([piece[n] for piece in held]) for n in range(2))
+        while sum(len(values) for values, _ in pending) < length:
+            pending.append(next(coming))
+        values, status = (np.concatenate([piece[n] for piece in pending]) for n in range(2))
         yield values[:length], status[:length]
-        held = [(values[length:], status[length:])]
+        pending = [(values[length:], status[length:])]

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from zwidth.model.equilibrium import Equilibrium
     from zwidth.study.loaded_charts import LoadPath
 
-ROUNDING: Final = 1e-9  # share of a stiffness, or of the hand's force across the direction, that is
+ROUNDING: Final = 1e-9  # share of a stiffness, of a force or of a torque below which it is rounding
 UNCHANGED: Final = 5e-7  # share of a stiffness that its four digits do not show
 Row = tuple[str, str]
 
 
 def balance_rows(point: OperatingPoint, stiffness_max: float | None = None) -> Iterator[Row]:
-    """Rows for people on the equilibrium of a point under load.
+    """Rows (label, value) on the equilibrium of a point under load.
 
     stiffness_max  of its chart [N/m]; None: not known
     """
@@ -35,7 +35,7 @@ def balance_rows(point: OperatingPoint, stiffness_max: float | None = None) -> I
 
 def balance_text(found: Equilibrium) -> str:
     """The forces in balance in words: of the wall, and of the hand, with what of it acts across the direction."""
-    turns = not np.any(found.screw[:3])
+    turns = not np.any(found.screw[:3])  # a moment about an axis is rendered, no force
     force, unit = (found.hand_moment, "N m") if turns else (found.hand_force, "N")
     text = f"wall {amount(found.wall_force, 'N')}, hand {vector(force, unit)}"
     if has_sideways_force(found):
@@ -45,26 +45,29 @@ def balance_text(found: Equilibrium) -> str:
 
 
 def has_sideways_force(found: Equilibrium) -> bool:
-    """Whether the hand pushes across the direction by more than rounding."""
-    size, linear = float(found.motions.mech.size[0]), np.any(found.screw[:3])
+    """Whether the hand pushes across the direction by more than rounding.
+
+    Force and moment compare by the mechanism's size: a moment counts as a force at that distance.
+    """
+    size, renders_force = float(found.motions.mech.size[0]), np.any(found.screw[:3])
     force, moment = (float(np.linalg.norm(part)) for part in (found.hand_force, found.hand_moment))
-    whole = max(force, moment / size) if linear else max(moment, force * size)
+    whole = max(force, moment / size) if renders_force else max(moment, force * size)
     return bool(np.linalg.norm(found.sideways_force) > ROUNDING * whole)
 
 
 def drive_rows(point: OperatingPoint) -> Iterator[Row]:
-    """Rows on each motor: its torque, and how far its drive is bent."""
+    """Rows (label, value) on each motor: its torque, and how far its drive is bent."""
     found, drives, mechanism = point.equilibrium, point.drives, point.mechanism
     assert mechanism is not None
     slides = mechanism.links.joint[drives.joint] == PRISMATIC
     torques = motor_torques(found)
-    for name, torque, bent, way in zip(drives.names, torques, found.deflections.tolist(), slides, strict=True):
-        flexible = f", its drive bent by {amount(bent, 'm' if way else 'rad')}" if bent else ""
+    for name, torque, bent, slide in zip(drives.names, torques, found.deflections.tolist(), slides, strict=True):
+        flexible = f", its drive bent by {amount(bent, 'm' if slide else 'rad')}" if bent else ""
         yield f"motor {name}", f"{amount(torque, 'N m')}{flexible}"
 
 
 def motor_torques(found: Equilibrium) -> list[float]:
-    """What each motor gives [N m], 0 where it is rounding."""
+    """Torque of each motor on its own side of the transmission [N m], 0 where it is rounding."""
     torques = found.torques / found.ratio
     torques[np.abs(torques) < ROUNDING * np.max(np.abs(torques), initial=0.0)] = 0.0
     return list(torques.tolist())
@@ -76,7 +79,7 @@ def motor_torques(found: Equilibrium) -> list[float]:
 def path_sentences(path: LoadPath) -> list[str]:
     """What the charts under all pushes say."""
     texts = _stiffness_text, _neglected_text, _fixed_surface_text, _sideways_text
-    said = [*(text(path) for text in texts), *_unanswered(path)]
+    said = [*(text(path) for text in texts), *_unanswered_sentences(path)]
     return [sentence for sentence in said if sentence]
 
 
@@ -124,37 +127,43 @@ def _sideways_text(path: LoadPath) -> str:
 
 
 def _neglected_text(path: LoadPath) -> str:
-    """Sentence on how much it changes the stiffness to neglect the change of the hand's force; "" if it is."""
-    off = _largest_difference(path, path.hand_neglected)
-    if off is None or path.hand == "neglected":
+    """Sentence on how much it changes the stiffness to neglect the change of the hand's force.
+
+    "" where the path's own charts neglect it, or no push has both stiffnesses
+    """
+    difference = _largest_difference(path, path.hand_neglected)
+    if difference is None or path.hand == "neglected":
         return ""
-    share, push = off
+    share, push = difference
     if share < ROUNDING:
         return "Whether the change of the hand's force is neglected makes no difference to these stiffnesses."
-    most, under = percent(share), as_written(push, "N")
-    return f"Neglecting the change of the hand's force changes it by {most} at most, under {under}."
+    largest, under = percent(share), as_written(push, "N")
+    return f"Neglecting the change of the hand's force changes it by {largest} at most, under {under}."
 
 
 def _fixed_surface_text(path: LoadPath) -> str:
-    """Sentence on the largest stiffness on a fixed surface, into which the handle sinks, against a kept
-    posture."""
+    """Sentence on the largest stiffness on a fixed surface, into which the handle sinks, against a kept posture.
+
+    Without any such stiffness the reasons; "" where no push has a chart
+    """
     sinks = "On a fixed surface, into which the handle sinks by F/K,"
-    off = _largest_difference(path, path.fixed_surface)
-    if off is None:
-        pushed = [step for step in path.steps if step.push and step.stiffness_max == step.stiffness_max]
+    difference = _largest_difference(path, path.fixed_surface)
+    if difference is None:
+        pushed = [step for step in path.steps if step.push and step.stiffness_max == step.stiffness_max]  # not nan
         reasons = sorted({step.fixed_surface_status for step in pushed})
         return f"{sinks} there is no answer: {'; '.join(reasons)}." if reasons else ""
-    share, push = off
+    share, push = difference
     if share < ROUNDING:
         return f"{sinks} the largest stiffness is the same."
-    most, under = percent(share), as_written(push, "N")
-    return f"{sinks} it differs from that with the posture kept by {most} at most, under {under}."
+    largest, under = percent(share), as_written(push, "N")
+    return f"{sinks} it differs from that with the posture kept by {largest} at most, under {under}."
 
 
 def _largest_difference(path: LoadPath, others: Floats) -> tuple[float, float] | None:
-    """The largest relative difference of other largest stiffnesses (pushes,) from the path's, and its push [N].
+    """Return the largest relative difference of stiffnesses from the path's own, and the push [N] that has it.
 
-    None where no push has both
+    others   (pushes,) largest stiffness under each push, computed otherwise [N/m]
+    Returns  None where no push but 0 has both stiffnesses
     """
     values, pushes = path.stiffness_max, path.pushes
     both = np.isfinite(values) & np.isfinite(others) & (pushes != 0.0)
@@ -165,20 +174,31 @@ def _largest_difference(path: LoadPath, others: Floats) -> tuple[float, float] |
     return float(share[k]), float(pushes[k])
 
 
-def _unanswered(path: LoadPath) -> Iterator[str]:
-    """Under which pushes there is no largest stiffness, and why: of each kind the reason of the weakest push."""
-    missing = [step for step in path.steps if step.stiffness_max != step.stiffness_max]
+def _unanswered_sentences(path: LoadPath) -> Iterator[str]:
+    """A sentence for each kind of status without a largest stiffness: under which pushes, and why.
+
+    The reason is that of the weakest push.
+    """
+    missing = [step for step in path.steps if step.stiffness_max != step.stiffness_max]  # nan
     for kind in dict.fromkeys(step.status.partition(":")[0] for step in missing):
-        own = [step for step in missing if step.status.partition(":")[0] == kind]
-        here = np.array([step in own for step in path.steps])
-        weakest = min(own, key=lambda step: abs(step.push))
-        yield f"Without an answer, {pushes_text(path.pushes, here)}: {weakest.status.rstrip('.')}."
+        of_kind = [step for step in missing if step.status.partition(":")[0] == kind]
+        under_kind = np.array([step in of_kind for step in path.steps])
+        weakest = min(of_kind, key=lambda step: abs(step.push))
+        yield f"Without an answer, {pushes_text(path.pushes, under_kind)}: {weakest.status.rstrip('.')}."
 
 
 def pushes_text(pushes: Floats, chosen: Flags) -> str:
-    """Some of the pushes in words: each stretch of neighbours from its first to its last."""
+    """Some of the pushes [N] in words: each stretch of neighbours from its first to its last.
+
+    chosen  (pushes,) true for those to be said
+    """
+    # first place of a stretch and the place behind its last, in turns
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
-    stretches = [(float(pushes[a]), float(pushes[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    stretches = [
+        (float(pushes[start]), float(pushes[stop - 1]))
+        for start, stop in zip(edges[::2], edges[1::2], strict=True)
+    ]
     return " and ".join(
-        as_written(a, "N") if a == b else f"{as_written(a, 'N')} to {as_written(b, 'N')}" for a, b in stretches
+        as_written(low, "N") if low == high else f"{as_written(low, 'N')} to {as_written(high, 'N')}"
+        for low, high in stretches
     )

@@ -62,16 +62,17 @@ def mechanism_scene(mechanism: Mechanism, posture: Posture) -> MechanismScene:
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
     flat = projection_axes(everything)
     planar = np.ptp(np.delete(everything, flat, axis=1)) <= SAME_POINT * max(float(np.ptp(everything)), 1e-9)
-    groups = _groups([mechanism.links.names[i] for i in bodies])
+    legend = _legend_of_links([mechanism.links.names[i] for i in bodies])
     closures, drives = mechanism.closures, mechanism.drives
+    # joints on the ground: of links whose parent is the base, and of loops that close on it (its index is -1)
     based = [i for i in np.flatnonzero(mechanism.links.parent < 0) if not _is_free(mechanism, int(i))]
     grounded = [p for a, p in zip(closures.a, closures.point_a, strict=True) if a < 0]
     grounded += [p for b, p in zip(closures.b, closures.point_b, strict=True) if b < 0]
     return MechanismScene(
         strokes=tuple(strokes),
-        names=tuple(name for name, _, _ in groups),
-        styles=tuple(n for _, n, _ in groups),
-        first=tuple(first for _, _, first in groups),
+        names=tuple(name for name, _, _ in legend),
+        styles=tuple(style for _, style, _ in legend),
+        first=tuple(first for _, _, first in legend),
         base=np.vstack([placed.origin[based].reshape(-1, 3), np.array(grounded).reshape(-1, 3)]),
         joints=joint_points(mechanism, placed),
         driven=placed.origin[drives.joint].reshape(-1, 3),
@@ -98,14 +99,15 @@ def stroke_places(mechanism: Mechanism, points_of_links: LinkPoints) -> list[lis
     """Of each drawn link the places that its stroke goes through, each on the link that carries it."""
     bodies = drawn_links(mechanism)
     places = [_link_places(mechanism, points_of_links, i) for i in bodies]
-    everything = np.vstack([_points(points_of_links, each) for each in places])
-    if np.ptp(everything, axis=0).any():
+    everything = np.vstack([_points(points_of_links, link_places) for link_places in places])
+    if np.ptp(everything, axis=0).any():  # the points are not all one
         return places
     return [_axis_places(mechanism, i) for i in bodies]  # a wrist, of which nothing has a length
 
 
 def link_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
-    """The points that a link joins, (k, 3), from its joint to the joints and points that it carries."""
+    """The points (k, 3) that a link joins, from its joint to the joints and points that it carries, in the base
+    frame [m]."""
     return _points(points_of_links, _link_places(mechanism, points_of_links, link))
 
 
@@ -118,7 +120,7 @@ def joint_places(mechanism: Mechanism) -> list[Place]:
 
 
 def joint_points(mechanism: Mechanism, points_of_links: LinkPoints) -> Floats:
-    """The points of `joint_places`, (k, 3)."""
+    """The points of `joint_places` in the base frame, (k, 3) [m]."""
     return _points(points_of_links, joint_places(mechanism))
 
 
@@ -128,8 +130,8 @@ def _link_places(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -
     start: Place = (link, np.zeros(3))
     places: list[Place] = [(link, links.tip[link])]
     places += [(int(child), np.zeros(3)) for child in np.flatnonzero(links.parent == link)]
-    for owners, at in ((closures.a, closures.point_a), (closures.b, closures.point_b)):
-        places += [(link, at[k]) for k in np.flatnonzero(owners == link)]
+    for owners, points in ((closures.a, closures.point_a), (closures.b, closures.point_b)):
+        places += [(link, points[k]) for k in np.flatnonzero(owners == link)]
     if mechanism.handle_link == link:
         places.append((link, mechanism.handle_point))
     stroke, known = [start], [_point(points_of_links, start)]
@@ -159,20 +161,26 @@ def _point(points_of_links: LinkPoints, place: Place) -> Floats:
 
 
 def projection_axes(points: Floats) -> list[int]:
-    """The two coordinates in which the points spread most, in the order x, y, z; x and y where it is a tie."""
-    spread = np.ptp(points, axis=0) + np.array([2.0, 2.0, 0.0]) * 1e-12
+    """The two coordinates (0, 1, 2 for x, y, z) in which the points (k, 3) spread most, in rising order.
+
+    x and y where it is a tie
+    """
+    spread = np.ptp(points, axis=0) + np.array([2.0, 2.0, 0.0]) * 1e-12  # so little that it decides only a tie
     return sorted(np.argsort(-spread, kind="stable")[:2].tolist())
 
 
-def _groups(names: list[str]) -> list[tuple[str, int, bool]]:
-    """Of each link its name, or that of all copies of a leg's link; the number of its style; whether it is the
-    first of that name."""
+def _legend_of_links(names: list[str]) -> list[tuple[str, int, bool]]:
+    """Return for each link the name shown, the number of its style, and whether it is the first of that name.
+
+    Copies of a leg's link (upper-1, upper-2) are shown under one name, with their count, in one style.
+    """
     kinds = [re.sub(r"-\d+$", "", name) for name in names]
     shown, known = [], list(dict.fromkeys(kinds))
     for name, kind in zip(names, kinds, strict=True):
         copies = kinds.count(kind)
+        # the style is the place of the kind among the different ones
         shown.append((f"{kind} ({copies})" if copies > 1 else name, known.index(kind)))
-    return [(name, n, shown.index((name, n)) == i) for i, (name, n) in enumerate(shown)]
+    return [(name, style, shown.index((name, style)) == i) for i, (name, style) in enumerate(shown)]
 
 
 def _is_free(mechanism: Mechanism, entry: int) -> bool:
@@ -199,8 +207,8 @@ def mode_strokes(mechanism: Mechanism, posture: Posture, count: int | None = Non
 
         x' = J B p'        as in `model.motions`; times the shape of a mode in p, how it moves the picture
 
-    count    n of the plant: driven and free joints, bending, then motors and an arm, with which no link moves;
-             None: without the latter
+    count    n, how many coordinates the plant has: driven and free joints, bending, then motors and an arm, with
+             which no link moves; None: without motors and arm
     Returns  SceneRates of a single posture that is OK
     """
     motions = Motions(pack(mechanism), posture.angles, mechanism.flexible)
@@ -242,20 +250,22 @@ class MassChain:
 
 def as_chain(plant: Plant) -> MassChain | None:
     """The plant as a row of masses joined to their neighbours and to the ground at the ends; None if it is not."""
-    n = plant.size
-    links = []
+    count = plant.size
+    along_chain = []
     if np.any(plant.mass != np.diag(np.diag(plant.mass))):
         return None
     for matrix in (plant.stiffness, plant.damping):
         scale = float(np.max(np.abs(matrix))) or 1.0
+        # a spring k between neighbours adds k to both diagonal entries and -k beside them: rows sum to the
+        # springs to the ground
         between = -np.diag(matrix, 1)
-        far = matrix - np.diag(np.diag(matrix)) + np.diag(between, 1) + np.diag(between, -1)
+        rest = matrix - np.diag(np.diag(matrix)) + np.diag(between, 1) + np.diag(between, -1)
         to_ground = matrix.sum(axis=1)
-        if np.any(far != 0.0) or np.any(between < 0.0) or np.any(np.abs(to_ground[1:-1]) > 1e-12 * scale):
+        if np.any(rest != 0.0) or np.any(between < 0.0) or np.any(np.abs(to_ground[1:-1]) > 1e-12 * scale):
             return None
         to_ground = np.where(np.abs(to_ground) > 1e-12 * scale, to_ground, 0.0)
-        last = to_ground[-1] if n > 1 else 0.0
+        last = to_ground[-1] if count > 1 else 0.0
         if to_ground[0] < 0.0 or last < 0.0:
             return None
-        links.append(np.concatenate([[to_ground[0]], between, [last]]))
-    return MassChain(np.diag(plant.mass), links[0], links[1])
+        along_chain.append(np.concatenate([[to_ground[0]], between, [last]]))
+    return MassChain(np.diag(plant.mass), along_chain[0], along_chain[1])

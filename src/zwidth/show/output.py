@@ -26,7 +26,7 @@ def json_value(value: Any) -> Any:
     {'radius': None, 'box': [0.0, 1.0]}
     """
     if _is_vector(value):
-        return [x if x - x == 0.0 else None for x in value.tolist()]
+        return [x if x - x == 0.0 else None for x in value.tolist()]  # x - x is nan where x is not finite
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -50,15 +50,15 @@ def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
 
     columns  name -> values (k,), all of one length
     """
-    rows = zip(*map(_cells, columns.values()), strict=True)
-    return "".join(",".join(row) + "\n" for row in [tuple(map(_cell, columns)), *rows])
+    rows = zip(*map(_column_cells, columns.values()), strict=True)
+    return "".join(",".join(row) + "\n" for row in [tuple(map(_csv_cell, columns)), *rows])
 
 
-def _cells(values: Sequence[Any]) -> list[str]:
-    """A column's values as texts; numbers need no quotation marks."""
+def _column_cells(values: Sequence[Any]) -> list[str]:
+    """A column's values as cells of CSV, "" for what is not finite; numbers need no quotation marks."""
     if _is_vector(values):
         return [repr(x) if x - x == 0.0 else "" for x in values.tolist()]  # type: ignore[attr-defined]
-    return [_cell(value) for value in json_value(values)]
+    return [_csv_cell(value) for value in json_value(values)]
 
 
 def _is_vector(value: Any) -> bool:
@@ -66,7 +66,7 @@ def _is_vector(value: Any) -> bool:
     return getattr(getattr(value, "dtype", None), "kind", "") == "f" and value.ndim == 1
 
 
-def _cell(value: Any) -> str:
+def _csv_cell(value: Any) -> str:
     """A value as a cell of CSV, in quotation marks where it has a comma, a quotation mark or a line's end."""
     text = "" if value is None else value if isinstance(value, str) else repr(value)
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text
@@ -88,11 +88,11 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
     try:
         path = Path(os.path.realpath(name))
         _check_place(path, name)
-        probe = _beside(path)
+        probe = _draft_path(path)
         os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         probe.unlink()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        raise _failed(name, error) from None
+        raise _write_error(name, error) from None
     return path
 
 
@@ -120,12 +120,12 @@ def replacing(path: Path) -> Iterator[Path]:
     Whatever interrupts the block, what stood at `path` before stays as it was and nothing else is left.
     Raises OutputError  where the system refuses to write
     """
-    draft = _beside(path)
+    draft = _draft_path(path)
     try:
         yield draft
         os.replace(draft, path)
     except OSError as error:
-        raise _failed(str(path), error) from None
+        raise _write_error(str(path), error) from None
     finally:
         with suppress(OSError):
             draft.unlink()
@@ -147,13 +147,16 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "replace").decode() for c in text)
 
 
-def _beside(path: Path) -> Path:
+def _draft_path(path: Path) -> Path:
     """A hidden name that nothing has yet, in the folder of `path` and with its ending."""
     return path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}")
 
 
-def _failed(name: str, error: Exception) -> OutputError:
-    """The error for a file that the system refuses to write."""
+def _write_error(name: str, error: Exception) -> OutputError:
+    """The error, in a sentence, for a file that the system refuses to write.
+
+    name  of the file as it was typed;   error  what the system raised
+    """
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return OutputError(
         f"{printable(name)}: cannot be written: {reason[:1].lower() + reason[1:]}; name another file"

@@ -36,8 +36,8 @@ HEADER_NAME: Final = "safe_walls.h"
 
 def header_text(table: SafeWalls) -> str:
     """The text of the header that holds this table."""
-    parts = _TEMPLATES / "safe_walls.h.txt"
-    text = parts.read_text(encoding="utf-8")
+    template = _TEMPLATES / "safe_walls.h.txt"
+    text = template.read_text(encoding="utf-8")
     for key, value in _fields(table).items():
         text = text.replace(f"@{key}@", value)
     return text
@@ -57,7 +57,7 @@ def sketch_text(table: SafeWalls) -> str:
         "TIMING": _timing(table.device.controller),
         "COORDINATES": str(coordinates),
         "PERIOD_US": f"{round(1e6 * float(table.device.controller.sampling_period))}UL",
-        "STIFFNESS": _double(_round_number(table)),
+        "STIFFNESS": _c_double(_starting_stiffness(table)),
         "HEADER": HEADER_NAME,
     }
     for key, value in fields.items():
@@ -68,13 +68,14 @@ def sketch_text(table: SafeWalls) -> str:
 def sketch_obstacle(controller: Controller) -> str:
     """Why no sketch can be written for a computer: a sketch has the backward difference, and nothing else.
 
-    Returns  "" where that is the loop of the file; a lag of the actuator lies behind the computer
+    Returns  a sentence; "" where the sketch computes the loop of the file. A lag of the actuator does not count,
+             since it lies behind the computer.
     """
-    computed = Controller(controller.sampling_period, controller.delay, force_limit=controller.force_limit)
-    own = replace(controller, actuator_time_constant=0.0)
-    if own == computed:
+    of_sketch = Controller(controller.sampling_period, controller.delay, force_limit=controller.force_limit)
+    of_file = replace(controller, actuator_time_constant=0.0)
+    if of_file == of_sketch:
         return ""
-    parts = wall_law_parts(own, spell_out=True)
+    parts = wall_law_parts(of_file, spell_out=True)
     return (
         "the sketch computes a wall by the backward difference, not filtered, and the file has "
         f"{comma_list(parts)}: its walls are those of another loop; export the header alone and compute that loop "
@@ -105,9 +106,9 @@ _TEMPLATES: Final = Path(__file__).parent / "safe_walls"
 def _fields(table: SafeWalls) -> dict[str, str]:
     """Text for each @KEY@ of the header's template."""
     grid, question = table.grid, table.question
-    d = grid.dimensions
+    dimensions = grid.dimensions
     loop = table.device.controller
-    low, most = table.ranges[..., 0].ravel(), table.ranges[..., 1].ravel()
+    low, high = table.ranges[..., 0].ravel(), table.ranges[..., 1].ravel()  # damping in each band [N s/m]
     return {
         "VERSION": __version__,
         "NAME": _comment(table.device.name),
@@ -117,21 +118,21 @@ def _fields(table: SafeWalls) -> dict[str, str]:
         "BYTES": str(table.size),
         "WHERE": _position_comment(table),
         "DIRECTION": _direction_comment(table),
-        "DIMENSIONS": str(d),
+        "DIMENSIONS": str(dimensions),
         "CELLS": f"{grid.count}UL",
         "TABLES": f"{question.slots}UL",
         "LEVELS": f"{table.levels}UL",
         "PARTS": f"{table.sectors.parts}UL",
-        "OUTSIDE": ", ".join(map(_double, (table.outside.stiffness, table.outside.low, table.outside.high))),
+        "OUTSIDE": ", ".join(map(_c_double, (table.outside.stiffness, table.outside.low, table.outside.high))),
         "TOO_LARGE": _size_check(max(table.top.size, low.size) * 4),
         "MOST_BYTES": f"{ADDRESSES - BESIDE}UL",
-        "GRID": "" if d == 0 else _grid_arrays(table),
-        "CELL": _ONE_CELL if d == 0 else _CELL,
+        "GRID": "" if dimensions == 0 else _grid_arrays(table),
+        "CELL": _ONE_CELL if dimensions == 0 else _CELL,
         "SECTOR": _SECTOR if question.slots > 1 else _NO_SECTOR,
         "LEVEL": _array("unsigned char", "zwidth_level", [f"{int(one)}U" for one in table.level]),
-        "TOP": _array("float", "zwidth_top", map(_single, table.top.ravel())),
-        "LOW": _array("float", "zwidth_low", map(_single, low)),
-        "HIGH": _array("float", "zwidth_high", map(_single, most)),
+        "TOP": _array("float", "zwidth_top", map(_c_float, table.top.ravel())),
+        "LOW": _array("float", "zwidth_low", map(_c_float, low)),
+        "HIGH": _array("float", "zwidth_high", map(_c_float, high)),
     }
 
 
@@ -152,13 +153,15 @@ def _position_comment(table: SafeWalls) -> str:
     base = np.eye(3)[: grid.dimensions]
     along = ""
     if not np.array_equal(grid.axes, base) or grid.through.any():
-        vectors = "; ".join(f"{name} along " + ", ".join(f"{c:.9g}" for c in axis) for name, axis in _named(table))
+        vectors = "; ".join(
+            f"{name} along " + ", ".join(f"{c:.9g}" for c in axis) for name, axis in _named_axes(table)
+        )
         point = ", ".join(f"{c:.9g}" for c in grid.through)
         along = f"\n   In the device's base frame they are {vectors}; their origin is at {point} [m]."
     return f"The position has {grid.dimensions} coordinates [m], and cells: {', '.join(parts)}.{along}"
 
 
-def _named(table: SafeWalls) -> Iterable[tuple[str, Any]]:
+def _named_axes(table: SafeWalls) -> Iterable[tuple[str, Any]]:
     """Name and unit vector (3,) of each axis of the table."""
     return zip(table.grid.names, table.grid.axes, strict=True)
 
@@ -175,7 +178,7 @@ def _direction_comment(table: SafeWalls) -> str:
 
 
 def _size_check(size: int) -> str:
-    """An #error for 8-bit boards where an array takes more bytes than their compilers allow; else ""."""
+    """An #error for 8-bit boards where an array of `size` bytes is more than their compilers allow; else ""."""
     if size <= AVR_REACH:
         return ""
     return '#error "a table of more than 32767 bytes is beyond what 8-bit boards read; export fewer cells"\n'
@@ -184,17 +187,20 @@ def _size_check(size: int) -> str:
 def _grid_arrays(table: SafeWalls) -> str:
     """Arrays of the grid in C: lowest coordinates [m], cells per metre, and numbers of cells, along each axis."""
     grid = table.grid
-    per_metre = [1.0 / float(step) for step in grid.step]
+    per_metre = ", ".join(_c_double(1.0 / float(step)) for step in grid.step)
     return (
-        f"static const double zwidth_low_m[{grid.dimensions}] = {{{', '.join(map(_double, grid.low))}}};\n"
-        f"static const double zwidth_cells_per_m[{grid.dimensions}] = {{{', '.join(map(_double, per_metre))}}};\n"
+        f"static const double zwidth_low_m[{grid.dimensions}] = {{{', '.join(map(_c_double, grid.low))}}};\n"
+        f"static const double zwidth_cells_per_m[{grid.dimensions}] = {{{per_metre}}};\n"
         f"static const unsigned long zwidth_counts[{grid.dimensions}] = "
         f"{{{', '.join(f'{count}UL' for count in grid.counts)}}};\n"
     )
 
 
 def _array(kind: str, name: str, values: Iterable[str]) -> str:
-    """A constant array of these values in C, in the board's program memory."""
+    """The C text of a constant array in the board's program memory.
+
+    kind    C type of its elements;   values  each element as C text
+    """
     listed = list(values)
     lines, line = [], ""
     for value in listed:
@@ -203,33 +209,33 @@ def _array(kind: str, name: str, values: Iterable[str]) -> str:
             line = ""
         line += f"{value}, "
     lines.append(line)
-    body = "\n  ".join(one.rstrip() for one in lines)
+    body = "\n  ".join(row.rstrip() for row in lines)
     return f"static const {kind} {name}[{len(listed)}] ZWIDTH_TABLE = {{\n  {body[:-1]}\n}};\n"
 
 
-def _single(value: float) -> str:
-    """A number of 32 bits; nine digits name it exactly."""
+def _c_float(value: float) -> str:
+    """A number as a C constant of 32 bits; nine digits name it exactly."""
     return f"{_with_point(f'{float(value):.9g}')}f"
 
 
-def _double(value: float) -> str:
-    """A number of 64 bits in C."""
+def _c_double(value: float) -> str:
+    """A number as a C constant of 64 bits."""
     return _with_point(repr(float(value)))
 
 
 def _with_point(text: str) -> str:
-    """A number that C reads as a floating-point one."""
+    """The text of a number, with ".0" where C would read it as a whole number."""
     return text if any(mark in text for mark in ".e") else f"{text}.0"
 
 
 def _comment(text: str) -> str:
-    """Text that ends no comment and begins none, in ASCII, on one line."""
+    """The text for a C comment: in ASCII, on one line, without what ends or begins a comment or a trigraph."""
     plain = printable(text).encode("ascii", "backslashreplace").decode()
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
 
 
-def _round_number(table: SafeWalls) -> float:
-    """A stiffness to begin with, of one digit: that of half of the cells at least."""
+def _starting_stiffness(table: SafeWalls) -> float:
+    """Stiffness that the sketch begins with [N/m]: in one digit, the median of the cells that have safe walls."""
     stiffness: Sequence[float] = table.rectangles[table.level > 0, EVERYWHERE].tolist() or [0.0]
     return float(f"{float(np.median(stiffness)):.0e}")
 

@@ -108,10 +108,12 @@ def sound_of(response: TimeResponse, pitch: Pitch = None, full_scale: float | No
             ValueError     for a run without its trail
     """
     time, position, unit = _handle_motion(response)
+    # Hz, at which the vibration's frequency is looked for, before the speed of the sound is known
     coarse = min(float(RATE), 2.0 / response.period)
     speed = speed_for(_late_frequency(_velocity(time, position, coarse), coarse), pitch)
     velocity = _velocity(time, position, RATE / speed)
     size = float(np.abs(velocity).max(initial=0.0))
+    # velocity times duration is a motion, in units of the largest
     if len(velocity) < FEWEST or not size * (time[-1] - time[0]) > QUIET:
         raise NoAnswerError("nothing vibrates: there is nothing to hear")
     once = _faded(velocity)
@@ -177,7 +179,11 @@ def write_sound(path: Path, sound: Sound) -> None:
 
 
 def _handle_motion(response: TimeResponse) -> tuple[Floats, Floats, float]:
-    """Time [s] and position of the handle as far as it is finite, in units of the farthest; that unit [m]."""
+    """Return the times of the handle's motion (k,) [s], its positions (k,), and the unit of these positions [m].
+
+    The unit is the largest distance from zero. The motion ends before the first position that is not finite.
+    Raises  ValueError for a run without its trail, NoAnswerError where fewer than FEWEST positions are finite
+    """
     if not response.trail.size:
         raise ValueError("the run has no trail to be heard; simulate it with trail=True")
     time = np.concatenate([[0.0], response.trail_time])
@@ -192,40 +198,45 @@ def _handle_motion(response: TimeResponse) -> tuple[Floats, Floats, float]:
 def _strongest_frequency(samples: Floats) -> float:
     """The peak of the spectrum of all samples [Hz], between bins by a parabola through the logarithms.
 
-    Without a window, which would take away a vibration that dies early.
+    Without a window, which would take away a vibration that dies early. Zeros after the samples, three times as
+    many, make the bins finer.
     """
     count = 4 * len(samples)
     spectrum = np.abs(np.fft.rfft(samples, count))
-    at = int(np.argmax(spectrum[1:-1])) + 1
-    a, b, c = np.log(np.maximum(spectrum[at - 1 : at + 2], 1e-300))
-    bend = a - 2.0 * b + c
-    shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
-    return float((at + np.clip(shift, -0.5, 0.5)) * RATE / count)
+    top = int(np.argmax(spectrum[1:-1])) + 1
+    before, highest, after = np.log(np.maximum(spectrum[top - 1 : top + 2], 1e-300))
+    bend = before - 2.0 * highest + after
+    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    return float((top + np.clip(shift, -0.5, 0.5)) * RATE / count)
 
 
 def _share_below(samples: Floats, frequency: float) -> float:
-    """Share of the energy below a frequency [Hz]."""
+    """Share of the samples' energy that their spectrum has below a frequency [Hz]."""
     energy = np.abs(np.fft.rfft(samples)) ** 2
     below = np.arange(len(energy)) * RATE < frequency * len(samples)
     return float(energy[below].sum() / energy.sum())
 
 
 def _late_frequency(velocity: Floats, rate: float) -> float:
-    """Dominant frequency in the second half [Hz], or of all if nothing moves by then; nan if nothing ever does."""
+    """Dominant frequency [Hz] in the second half of velocities at this rate [Hz].
+
+    That of all velocities if nothing moves by then; nan if nothing ever does.
+    """
     late = dominant_frequency(velocity[len(velocity) // 2 :], 1.0 / rate)
     return late if late > 0.0 else dominant_frequency(velocity, 1.0 / rate)
 
 
 def _velocity(time: Floats, position: Floats, rate: float) -> Floats:
-    """Velocity at evenly spaced times, at this rate [Hz], less its straight line.
+    """Velocity (n,) at evenly spaced times, at this rate [Hz], less its straight line.
 
+    time, position  (k,) of the trail; the velocity is per second in the unit of the position
     The trail's points are not even where a delay divides the interval: its cubic spline is differentiated at
     points that are, several times as many as are wanted where it has more, and these are filtered and thinned out.
     """
     from scipy.interpolate import CubicSpline
     from scipy.signal import detrend, resample_poly
 
-    trail_rate = (len(time) - 1) / (time[-1] - time[0])
+    trail_rate = (len(time) - 1) / (time[-1] - time[0])  # points a second, in the mean
     skip = max(1, int(trail_rate / (FINER * rate)))
     time, position = time[::skip], position[::skip]
     finer = max(1, min(FINER, ceil(trail_rate / skip / rate)))

@@ -48,9 +48,13 @@ _TYPED: Final = {ord(SPACE): " ", ord(THIN): " ", ord(MINUS): "-"}
 
 
 def exponent_of(value: float) -> int:
-    """Power of ten, a multiple of 3 that has a prefix, under which |value| reads as 1 to 999; 0 for 0."""
+    """Exponent of ten, a multiple of 3 that has a prefix, under which |value| reads as 1 to 999.
+
+    0 for 0 and for what is not finite
+    """
     if value == 0.0 or not isfinite(value):
         return 0
+    # 1e-12, since the logarithm of 1000 may be rounded to less than 3
     return min(max(3 * floor(log10(abs(value)) / 3.0 + 1e-12), -9), 9)
 
 
@@ -66,8 +70,8 @@ def scaled(exponent: int, unit: str) -> str:
     return f"10{str(exponent).translate(_RAISED)}{SPACE}{unit}"
 
 
-def _prefixed(value: float, unit: str) -> int:
-    """The power of ten of the prefix that a value of this unit is written with; 0 for none."""
+def _prefix_exponent(value: float, unit: str) -> int:
+    """Exponent of ten of the prefix that a value of this unit is written with; 0 for none."""
     exponent = exponent_of(value)
     return exponent if exponent in _TAKES.get(unit, ()) else 0
 
@@ -139,7 +143,7 @@ def _rounded(value: float, digits: int) -> str:
 
 
 def _unbroken(unit: str) -> str:
-    """The unit after a no-break space, with such in it; "" for none."""
+    """The unit after a no-break space, its own blanks no-break too; "" where there is no unit."""
     return (SPACE + unit.replace(" ", SPACE)) if unit else ""
 
 
@@ -155,7 +159,7 @@ def quantity(value: float, unit: str) -> str:
     if not isfinite(value):
         return f"{number(value)}{_unbroken(unit)}"
     rounded = float(f"{value:.{DIGITS - 1}e}")  # so that 999.996 becomes 1.000 k, not 1000
-    exponent = _prefixed(rounded, unit)
+    exponent = _prefix_exponent(rounded, unit)
     return f"{number(rounded / 10.0**exponent)}{_unbroken(PREFIXES[exponent] + unit)}"
 
 
@@ -171,7 +175,7 @@ def as_written(value: float, unit: str = "") -> str:
     ('1.25\xa0ms', '0.03\xa0kg', '1\xa0kHz')
     """
     unit = spoken_unit(unit)
-    exponent = _prefixed(value, unit)
+    exponent = _prefix_exponent(value, unit)
     shown = f"{value / 10.0**exponent:.6g}"
     if "e" in shown:
         mantissa, power = shown.split("e")
@@ -254,7 +258,11 @@ def energy_label(name: str) -> str:
 
 
 def energy_rows(entries: Mapping[str, float], stored: float) -> Iterator[tuple[str, str, str]]:
-    """Rows of a table: what each has put in, by its name, and how much more is stored than at the start [J]."""
+    """Rows of a table (name, energy put in, energy taken out), as texts with "" for the one that does not apply.
+
+    entries  name -> energy that each part has put in, negative if it took it out [J]
+    stored   how much more is stored than at the start [J]; it makes the last row
+    """
     largest = max([abs(stored), *map(abs, entries.values())])
     for name, energy in entries.items():
         if abs(energy) > NEGLIGIBLE * largest:
@@ -306,11 +314,14 @@ def keys_of_moments(value: Any, table: str = "") -> Any:
         if table in OF_FILES:
             return value
         kept = OF_SPACE.get(table, frozenset())
-        return {(key if key in kept else _key(key)): keys_of_moments(inner, key) for key, inner in value.items()}
+        return {
+            (key if key in kept else _key_of_moments(key)): keys_of_moments(inner, key)
+            for key, inner in value.items()
+        }
     return [keys_of_moments(inner, table) for inner in value] if isinstance(value, list | tuple) else value
 
 
-def _key(key: Any) -> Any:
+def _key_of_moments(key: Any) -> Any:
     """The key with the unit of a moment about an axis in place of that of a force; keys of lengths stay."""
     if not isinstance(key, str) or "." in key or KEPT.fullmatch(key):  # a dotted path is of the device file
         return key

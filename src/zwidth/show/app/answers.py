@@ -56,7 +56,7 @@ class PageAnswers:
         head: dict[str, Any] = {"id": request.id, "kind": request.kind, "ok": True}
         arrays: Mapping[str, Any] = {}
         try:
-            with self._translated(request):
+            with self._errors_translated(request):
                 contents, arrays = self._contents(request)
             head |= contents
         except NoAnswerError as error:
@@ -67,11 +67,11 @@ class PageAnswers:
         return pack_frame(head, arrays)
 
     def progress(self, stage: str, done: int, of: int) -> None:
-        """Tell the page how far the computation is."""
+        """Tell the page how far the computation is: `done` of `of` steps of this stage."""
         asked = self._asked
         self.report(pack_frame({"id": asked.id, "kind": "progress", "stage": stage, "done": done, "of": of}, {}))
 
-    def _translated(self, request: Computed | FileRequest) -> Any:
+    def _errors_translated(self, request: Computed | FileRequest) -> Any:
         """Context in which errors are explained in words about the request's device and model."""
         state: State | None = getattr(request, "state", None)
         name, model = (state.device, state.model) if state else ("", None)

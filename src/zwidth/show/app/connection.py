@@ -42,14 +42,14 @@ class Lane:
     def __init__(self, pool: SparePool, send: Send, files: dict[str, FileRequest], confirms: bool) -> None:
         self.pool, self.send, self.files = pool, send, files
         self.process: ComputeProcess | None = None
-        self._waiting: dict[str, Computed] = {}
-        self._sent_files: set[str] = set()
-        self._news = asyncio.Event()
-        self._room = asyncio.Semaphore(IN_FLIGHT) if confirms else None
-        self._computing: str | None = None
+        self._waiting: dict[str, Computed] = {}  # kind of request -> the newest one
+        self._sent_files: set[str] = set()  # "NAME:ID" of those that the process has
+        self._news = asyncio.Event()  # set where a request may wait
+        self._room = asyncio.Semaphore(IN_FLIGHT) if confirms else None  # for views on their way
+        self._computing: str | None = None  # kind of request, since the loop's time `_since` [s]
         self._since = 0.0
-        self._ended_for: str | None = None
-        self._watch: asyncio.Task[None] | None = None
+        self._ended_for: str | None = None  # "replaced" or "stopped": why this lane ended its process
+        self._watch: asyncio.Task[None] | None = None  # waits until patience is lost
         self.task = asyncio.ensure_future(self._run())
 
     def ask(self, request: Computed) -> None:
@@ -119,7 +119,7 @@ class Lane:
                 self._room.release()
 
     async def _compute(self, request: Computed) -> bool:
-        """Have a request computed and send its answer. Returns whether a view was sent."""
+        """Have a request computed and send its answer. Returns whether that was sent; a failure does not count."""
         try:
             if self.process is None:
                 self.process, self._sent_files = await self.pool.take(), set()
@@ -184,7 +184,7 @@ class Connection:
             if not isinstance(request, FileRequest) and len(message) > LARGEST_REQUEST:
                 raise ValueError(f"a request may have {LARGEST_REQUEST:,} characters at most")
         except ValidationError as error:
-            await self._refuse(message, [_sentence(one) for one in error.errors()[:5]])
+            await self._refuse(message, [_fault_sentence(one) for one in error.errors()[:5]])
             return
         except RecursionError:
             await self._refuse(message, ["the message is nested too deeply"])
@@ -233,7 +233,11 @@ class Connection:
 
 
 def failure(number: int, kind: str, sentences: list[str], status: str) -> bytes:
-    """The frame of a request that was not computed."""
+    """The frame of a request that was not computed.
+
+    number     the id of the request;   kind  its kind
+    sentences  why;   status  "bad input", "stopped" or "lost"
+    """
     return pack_frame({"id": number, "kind": kind, "ok": False, "status": status, "sentences": sentences}, {})
 
 
@@ -242,7 +246,7 @@ def _check_constant(name: str) -> Any:
     raise ValueError(f"numbers must be finite, got {name}")
 
 
-def _sentence(fault: Any) -> str:
+def _fault_sentence(fault: Any) -> str:
     """A fault of a request that pydantic found, as one sentence with the path of the key."""
     place = ".".join(str(step) for step in fault["loc"][1:] if not str(step).startswith("function"))
     return f"{place or 'the request'}: {fault['msg'][:1].lower()}{fault['msg'][1:]}"

@@ -30,13 +30,13 @@ def pack_frame(head: Mapping[str, Any], arrays: Mapping[str, ArrayLike]) -> byte
     """
     table: dict[str, list[Any]] = {}
     parts: list[bytes] = []
-    at = 0
+    start = 0  # first byte of the next array, from the end of the head
     for name, values in arrays.items():
         kind, data = _as_sent(np.asarray(values))
-        table[name] = [kind, list(data.shape), at]
+        table[name] = [kind, list(data.shape), start]
         content = data.tobytes()
         parts.append(content + bytes(-len(content) % ALIGNED))
-        at += len(parts[-1])
+        start += len(parts[-1])
     text = json.dumps(json_value({**head, "arrays": table}), allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-(LENGTH + len(text)) % ALIGNED)
     return len(text).to_bytes(LENGTH, "little") + text + b"".join(parts)
@@ -48,9 +48,9 @@ def unpack_frame(message: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]
     head = json.loads(message[LENGTH : LENGTH + length])
     types = dict(TYPES.values())
     arrays = {}
-    for name, (kind, shape, at) in head["arrays"].items():
+    for name, (kind, shape, start) in head["arrays"].items():
         count = int(np.prod(shape, dtype=np.int64))
-        arrays[name] = np.frombuffer(message, types[kind], count, LENGTH + length + at).reshape(shape)
+        arrays[name] = np.frombuffer(message, types[kind], count, LENGTH + length + start).reshape(shape)
     return head, arrays
 
 

@@ -58,9 +58,11 @@ def nyquist(point: OperatingPoint, wall: Wall) -> Contents:
     """
     loop = point.loop
     angles = np.geomspace(LOWEST, np.pi - LOWEST, ANGLES)
+    # A P and A P w, unlike P and P w, are finite at a pole of the plant too
     A, AP, APw = terms_along(circle_factors(table_of_loops(loop)), angles).T
     L = (wall.stiffness * AP + wall.damping * APw) / A
-    arrays: dict[str, Any] = {"open_loop": np.column_stack([L.real, L.imag, angles / (2.0 * np.pi * loop.period)])}
+    frequencies = angles / (2.0 * np.pi * loop.period)
+    arrays: dict[str, Any] = {"open_loop": np.column_stack([L.real, L.imag, frequencies])}
     head: dict[str, Any] = {}
     free = point.without_operator.loop
     handle = free.plant.handle
@@ -69,12 +71,15 @@ def nyquist(point: OperatingPoint, wall: Wall) -> Contents:
     alone = stable_alone(free)
     if alone.fails or point.load_omissions:
         return {"no_disks": alone.reason or point.load_omissions[0]}, arrays
-    every = angles[:: max(1, ANGLES // DISKS)]
-    disks = response_disks(free, port(free.plant, handle), every)
-    A, AP, APw = terms_along(circle_factors(table_of_loops(free)), every).T
-    law = (wall.stiffness * AP + wall.damping * APw) / AP
-    centre, radius = disks.centre * law, disks.radius * np.abs(law)
-    arrays["disks"] = np.column_stack([centre.real, centre.imag, radius, every / (2.0 * np.pi * loop.period)])
+    disk_angles = angles[:: max(1, ANGLES // DISKS)]
+    disks = response_disks(free, port(free.plant, handle), disk_angles)
+    A, AP, APw = terms_along(circle_factors(table_of_loops(free)), disk_angles).T
+    # K + B w, by which the disk of P is turned and scaled to that of L
+    wall_law = (wall.stiffness * AP + wall.damping * APw) / AP
+    centre, radius = disks.centre * wall_law, disks.radius * np.abs(wall_law)
+    arrays["disks"] = np.column_stack(
+        [centre.real, centre.imag, radius, disk_angles / (2.0 * np.pi * loop.period)]
+    )
     return head, arrays
 
 
@@ -84,7 +89,7 @@ def eigenvalues_of(point: OperatingPoint, wall: Wall) -> Contents:
     return {}, {"z": np.column_stack([z.real, z.imag])}
 
 
-Contents = tuple[dict[str, Any], dict[str, Any]]
+Contents = tuple[dict[str, Any], dict[str, Any]]  # head of an answer or of a layer in it, and its arrays by name
 
 Layer = Callable[[OperatingPoint, Any, State, Device], Contents]  # of a point, its chart, the state and its device
 
@@ -141,7 +146,7 @@ def page_view(opened: OpenedDevices, state: State, layers: Sequence[str], neares
         # the mouse cannot hold it about an axis, which its layer says; the chart is the one held by nobody
         state = state.model_copy(update={"hand": None, "operator": "none"})
         device = opened.device(state)
-    point, position = _point(opened, state, device, nearest)
+    point, position = _point_near(opened, state, device, nearest)
     head: dict[str, Any] = {"moments": point.turns}
     if position is not None:
         head["position"] = position
@@ -151,25 +156,29 @@ def page_view(opened: OpenedDevices, state: State, layers: Sequence[str], neares
         try:
             if chart is None and name in OF_CHART:
                 chart = point.chart(decay="decay" in layers)
-            found, more = LAYERS[name](point, chart, state, device)
+            layer_head, layer_arrays = LAYERS[name](point, chart, state, device)
             if name == "scene" and "touch" in layers:  # the page draws it vibrating, with the modes of that layer
                 still, rates = scene_rates(point)
-                found, more = found | still, more | rates
+                layer_head, layer_arrays = layer_head | still, layer_arrays | rates
         except (ArithmeticError, ValueError, NotImplementedError, ChartError) as error:
             missing = isinstance(error, MissingNumbersError)
             if name == "chart" and not missing:
                 raise
-            head[name] = {"reason": f"{'It ' if missing else ''}{_said(error)}"}
+            head[name] = {"reason": f"{'It ' if missing else ''}{_failure_sentence(error)}"}
             continue
-        head[name] = found
-        arrays |= {f"{name}.{key}": value for key, value in more.items()}
+        head[name] = layer_head
+        arrays |= {f"{name}.{key}": value for key, value in layer_arrays.items()}
     return head, arrays
 
 
-def _point(
+def _point_near(
     opened: OpenedDevices, state: State, device: Device, nearest: bool
 ) -> tuple[OperatingPoint, tuple[float, ...] | None]:
-    """The operating point of a state, and where it is if the handle cannot be where the state has it."""
+    """The operating point of a state, and None.
+
+    With `nearest`, where the handle cannot be at the state's position: the nearest answered point, and its
+    position (x, y, z) [m]. Raises OutOfReach where there is none, or without `nearest`
+    """
     try:
         return opened.point(state, device), None
     except OutOfReach as error:
@@ -207,12 +216,12 @@ def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 
 
 def rings(outlines: Iterable[Floats]) -> dict[str, Any]:
-    """Closed rings one after another, and where each ends."""
+    """Arrays `rings`, rows (K, B) of closed outlines one after another, and `rings_ends`, the row behind each."""
     return _joined("rings", list(outlines), 2)
 
 
 def edge_arrays(arcs: Iterable[BoundaryArc]) -> dict[str, Any]:
-    """The arcs of an edge one after another, rows (K, B, f), and where each ends."""
+    """Arrays `arcs`, rows (K, B, f) of an edge's arcs one after another, and `arcs_ends`, the row behind each."""
     return _joined("arcs", [np.column_stack([a.stiffness, a.damping, a.frequency]) for a in arcs], 3)
 
 
@@ -224,7 +233,7 @@ def _joined(name: str, parts: Sequence[Floats], width: int) -> dict[str, Any]:
 
 
 def _decay(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-    """Contours of equal spectral radius, and the fastest-decaying wall."""
+    """Outlines of the walls within each of three spectral radii, and the fastest-decaying wall with K, B >= 0."""
     from zwidth.chart.chart import StabilityChart, stability_chart
 
     best = chart.fastest_decay
@@ -242,8 +251,8 @@ def _decay(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 
 def _models(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
     """The charts of the simpler models."""
-    others = [name for name in MODELS if name != (point.model or "full")]
-    return _several({name: _with_model(device, state, name) for name in others})
+    simpler = [name for name in MODELS if name != (point.model or "full")]
+    return _charts_by_name({name: _with_model(device, state, name) for name in simpler})
 
 
 def _with_model(device: Device, state: State, model: str) -> Callable[[], Chart]:
@@ -279,11 +288,14 @@ def _hands(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
     for name in bundled_names(OPERATORS):
         if name != now:
             wanted[name] = held(name)
-    return _several(wanted)
+    return _charts_by_name(wanted)
 
 
-def _several(wanted: Mapping[str, Callable[[], Chart]]) -> Contents:
-    """Largest stiffness and outlines of several charts by their names; one that has none says why."""
+def _charts_by_name(wanted: Mapping[str, Callable[[], Chart]]) -> Contents:
+    """Largest stiffness and outlines of several charts by their names; one that has no answer says why.
+
+    wanted  name -> function without arguments that computes the chart
+    """
     head: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
     for name, compute in wanted.items():
@@ -291,20 +303,20 @@ def _several(wanted: Mapping[str, Callable[[], Chart]]) -> Contents:
             chart = compute()
             outline = rings(chart.regions)
         except (ArithmeticError, ValueError, ChartError) as error:
-            head[name] = {"reason": _said(error)}
+            head[name] = {"reason": _failure_sentence(error)}
             continue
         head[name] = {"stiffness_max": chart.stiffness_max}
         arrays |= {f"{name}.{key}": value for key, value in outline.items()}
     return {"charts": head}, arrays
 
 
-def _said(error: Exception) -> str:
+def _failure_sentence(error: Exception) -> str:
     """Why there is nothing to show, in a sentence."""
     return f"this is undecided: {error}" if isinstance(error, ChartError) else str(error)
 
 
 def _guarantees(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-    """The walls with each guarantee."""
+    """Of each guarantee its largest stiffness and the outlines of its walls, and the premises of all."""
     head: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
     found = point.guarantees()
@@ -318,30 +330,33 @@ def _guarantees(point: OperatingPoint, chart: Chart, state: State, device: Devic
 
 
 def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-    """The published conditions, each as its largest stiffness over damping."""
+    """The published conditions: in the head what each says, in the arrays its largest stiffness over `damping`.
+
+    One that lacks numbers is left out.
+    """
     compared = point.bounds()
     top = 1.2 * max(chart.damping_max, chart.box[3], 1e-12)  # a fifth beyond the chart, and never 0
     dampings = np.linspace(0.0, top, DAMPINGS)
     head, arrays = [], {"damping": dampings}
-    for n, one in enumerate(compared.bounds):
-        if one.lacking:
+    for n, bound in enumerate(compared.bounds):
+        if bound.lacking:
             continue
         head.append(
             {
-                "name": one.name,
-                "source": one.source,
-                "claim": one.claim,
-                "kind": one.kind,
-                "violated": list(one.violated),
-                "stiffness_max": one.stiffness_max,
+                "name": bound.name,
+                "source": bound.source,
+                "claim": bound.claim,
+                "kind": bound.kind,
+                "violated": list(bound.violated),
+                "stiffness_max": bound.stiffness_max,
                 "array": f"bounds.{n}",
             }
         )
-        arrays[f"{n}"] = one.stiffness_max_at(dampings)
+        arrays[f"{n}"] = bound.stiffness_max_at(dampings)
     return {"conditions": head}, arrays
 
 
-def _chain(point: OperatingPoint) -> MassChain | None:
+def _mass_chain(point: OperatingPoint) -> MassChain | None:
     """The plant as a row of masses; None where it is none, or a measured response."""
     return None if point.response is not None else as_chain(point.ungripped_plant)
 
@@ -349,7 +364,7 @@ def _chain(point: OperatingPoint) -> MassChain | None:
 def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
     """Where the links are, the handle and the rendered direction; the masses of a plant that is a row of them."""
     if point.mechanism is None:
-        chain = _chain(point)
+        chain = _mass_chain(point)
         if chain is None:
             return {"kind": "none"}, {}
         return {"kind": "chain"}, {
@@ -359,38 +374,42 @@ def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
         }
     posture = point.posture
     assert posture is not None
-    made = mechanism_scene(point.mechanism, posture)
+    scene = mechanism_scene(point.mechanism, posture)
     rendered = np.asarray(point.direction, dtype=float)
     head: dict[str, Any] = {
         "kind": "mechanism",
-        "names": list(made.names),
-        "styles": list(made.styles),
-        "drives": list(made.drives),
-        "flat": list(made.flat),
-        "planar": stays_in_plane(made, posture),
+        "names": list(scene.names),
+        "styles": list(scene.styles),
+        "drives": list(scene.drives),
+        "flat": list(scene.flat),
+        "planar": stays_in_plane(scene, posture),
         "projected": float(posture.projected),
         "turns": point.turns,
     }
     if point.load is not None:
         head["load"] = {"force": point.load.force, "gravity": point.load.gravity}
-    joined = _joined("strokes", list(made.strokes), 3)
+    joined = _joined("strokes", list(scene.strokes), 3)
     return head, {
         **joined,
-        "base": made.base,
-        "joints": made.joints,
-        "driven": made.driven,
-        "handle": made.handle,
+        "base": scene.base,
+        "joints": scene.joints,
+        "driven": scene.driven,
+        "handle": scene.handle,
         "direction": rendered[3:] if point.turns else rendered[:3],
     }
 
 
 def scene_rates(point: OperatingPoint) -> Contents:
-    """How the scene's points move per unit of each coordinate of the plant; or `still`, why that is not drawn."""
+    """How the scene's points move per unit of each coordinate of the plant.
+
+    Returns  arrays of rates, (..., 3, coordinates); or none, with the reason in the head as `still`
+    """
     if point.mechanism is None:
-        chain = _chain(point)
+        chain = _mass_chain(point)
         if chain is None:
             return {}, {}
-        rates = np.zeros((len(chain.mass), 3, point.plant.size))  # an arm's own coordinate is the last
+        # (masses, xyz, coordinates): each mass moves along x with its own; an arm's, which is the last, moves none
+        rates = np.zeros((len(chain.mass), 3, point.plant.size))
         np.fill_diagonal(rates[:, 0, :], 1.0)
         return {}, {"masses_rates": rates}
     if point.load is not None:
@@ -398,16 +417,16 @@ def scene_rates(point: OperatingPoint) -> Contents:
     if point.model not in ("full", None):
         return {"still": f"its vibration is drawn for the full model alone, not for {point.model!r}"}, {}
     assert point.posture is not None
-    made = mode_strokes(point.mechanism, point.posture, point.plant.size)
+    moved = mode_strokes(point.mechanism, point.posture, point.plant.size)
     return {}, {
-        "strokes_rates": made.strokes,
-        "joints_rates": made.joints,
-        "driven_rates": made.driven,
-        "handle_rates": made.handle[None],
+        "strokes_rates": moved.strokes,
+        "joints_rates": moved.joints,
+        "driven_rates": moved.driven,
+        "handle_rates": moved.handle[None],
     }
 
 
-def _face(draw: Callable[[OperatingPoint, Wall], Contents]) -> Layer:
+def _wall_picture(draw: Callable[[OperatingPoint, Wall], Contents]) -> Layer:
     """Layer of another picture of the state's wall; without a wall, or of a response, it raises ValueError."""
 
     def face(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
@@ -435,23 +454,23 @@ def touch_blocks(point: OperatingPoint, start_position: float = 0.0, start_veloc
     """
     from zwidth.contact.touch_step import arm_spring, touch_numbers
 
-    made = touch_numbers(point.loop, start_position=start_position, start_velocity=start_velocity)
+    touch = touch_numbers(point.loop, start_position=start_position, start_velocity=start_velocity)
     arm = arm_spring(point.operator) if point.operator is not None else (0.0, 0.0)
     head = {
-        "ports": made.ports,
-        "port_count": made.port_count,
-        "period": made.period,
+        "ports": touch.ports,
+        "port_count": touch.port_count,
+        "period": touch.period,
         "delay_samples": point.controller.delay,
-        "states_at": made.states_at,
-        "names": list(made.names),
+        "states_at": touch.states_at,
+        "names": list(touch.names),
         "arm": list(arm),
     }
     arrays = {
-        "counts": made.counts,
-        "numbers": made.numbers,
-        "memory": made.memory,
-        "noise": made.noise,
-        "coordinates": made.coordinates,
+        "counts": touch.counts,
+        "numbers": touch.numbers,
+        "memory": touch.memory,
+        "noise": touch.noise,
+        "coordinates": touch.coordinates,
     }
     return head, arrays
 
@@ -464,9 +483,9 @@ LAYERS: dict[str, Layer] = {
     "hands": _hands,
     "guarantees": _guarantees,
     "bounds": _bounds,
-    "impedance": _face(impedance),
-    "nyquist": _face(nyquist),
-    "eigenvalues": _face(eigenvalues_of),
+    "impedance": _wall_picture(impedance),
+    "nyquist": _wall_picture(nyquist),
+    "eigenvalues": _wall_picture(eigenvalues_of),
     "touch": _touch,
 }
 # In this order they are computed; these need the chart.

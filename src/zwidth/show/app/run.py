@@ -79,22 +79,25 @@ def make_server(settings: Settings) -> Server:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket on the port, or on one of those after it that is free. Raises BadInput."""
+    """A socket that listens on the port, or on the first free one after it. Raises BadInput where there is none.
+
+    port  0: any that is free
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    wrong = ""
+    last_reason = ""
     for candidate in range(port, port + (TRIED if port else 1)):
-        made = socket.socket(family, socket.SOCK_STREAM)
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            made.bind((host, candidate))
-            made.listen(64)
+            listening.bind((host, candidate))
+            listening.listen(64)
         except (OSError, OverflowError) as error:
-            made.close()
-            wrong = getattr(error, "strerror", "") or str(error)
+            listening.close()
+            last_reason = getattr(error, "strerror", "") or str(error)
             continue
-        return made
+        return listening
     raise BadInput(
-        f"--port {port}: the workbench cannot listen on {host}: {wrong}; choose another --port or --host"
+        f"--port {port}: the workbench cannot listen on {host}: {last_reason}; choose another --port or --host"
     )
 
 
@@ -128,13 +131,13 @@ def start_of(device: str | None, settings: Sequence[str]) -> dict[str, Any]:
     from zwidth.device.load import load
 
     name = device or first_bundled()
-    made = load(name, settings)
-    changes = dict(address.parse(one) for one in settings)
+    loaded = load(name, settings)
+    changes = dict(address.parse(text_of_setting) for text_of_setting in settings)
     if name in bundled_names():
         return {"state": {"device": name, "settings": changes}, "files": []}
     text = device_text(name)
     files = [{"name": Path(name).name, "text": text}, *_named_files(parse_document(text, name), Path(name).parent)]
-    state = {"device": Path(made.label).name, "from_file": True, "settings": changes}
+    state = {"device": Path(loaded.label).name, "from_file": True, "settings": changes}
     return {"state": state, "files": files}
 
 

@@ -77,7 +77,7 @@ class Settings:
         return name in LOOPBACK
 
     def admits(self, token: str | None) -> bool:
-        """Whether a request brings the token."""
+        """Whether a request brings the token; true of any where none is wanted."""
         return not self.token or secrets.compare_digest((token or "").encode(), self.token.encode())
 
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 WORDS: Final = {"figure": "chart", "data": "chart", "report": "report", "python": "lines"}
-Contents = tuple[dict[str, Any], dict[str, Any]]
+Contents = tuple[dict[str, Any], dict[str, Any]]  # head of an answer, and its arrays by name
 
 
 def workspace(opened: OpenedDevices, request: MapRequest, progress: Progress) -> Contents:
@@ -44,6 +44,9 @@ def workspace(opened: OpenedDevices, request: MapRequest, progress: Progress) ->
 
     That is the plane that the handle cannot leave; of a spatial device the one through the handle in which its
     links spread most.
+
+    Returns  head: the measure and its unit; arrays: `values` and `status` over `y` and `x` [m], and the plane by a
+             point `through` and its unit vectors `first` and `second`
     """
     from zwidth.study.workspace.map import workspace_map
     from zwidth.study.workspace.plane_grid import plane_of
@@ -99,12 +102,15 @@ def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) 
     """One contact with the state's wall, as `zwidth simulate` has it, and what draws its vibration in the page.
 
     That is of the layers `scene` and `touch`, the device at the contact's start.
+
+    Returns  head: the contact's document, and `touch` and `scene`; arrays, at each sample: the encoder's `reading`
+             and the true `place` of the handle [m], the `force` [N], and the energy `made` by the wall [J]
     """
     state = request.state
     point = opened.point(state)
     if state.wall is None:
         raise BadInput("choose a wall on the chart first")
-    made = point.simulate(
+    simulation = point.simulate(
         stiffness=state.wall.stiffness,
         damping=state.wall.damping,
         wall="one-sided" if request.one_sided else "two-sided",
@@ -114,28 +120,28 @@ def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) 
         duration=request.duration,
         progress=progress,
     )
-    document = made.document()
-    for name in made.response.series:
+    document = simulation.document()
+    for name in simulation.response.series:
         del document[name]
     document["delay_samples"] = point.controller.delay
     arrays = {
-        "time": made.time,
-        "reading": made.position,
-        "place": made.response.truth,
-        "force": made.force,
-        "made": _made_by_wall(made),
+        "time": simulation.time,
+        "reading": simulation.position,
+        "place": simulation.response.truth,
+        "force": simulation.force,
+        "made": _energy_made_by_wall(simulation),
     }
     try:
-        blocks, more = touch_blocks(point, request.depth, request.velocity)
+        blocks, touch_arrays = touch_blocks(point, request.depth, request.velocity)
         still, rates = scene_rates(point)
     except (ArithmeticError, ValueError) as error:
         return {**document, "touch": {"reason": str(error)}}, arrays
-    arrays |= {f"touch.{name}": value for name, value in more.items()}
+    arrays |= {f"touch.{name}": value for name, value in touch_arrays.items()}
     arrays |= {f"scene.{name}": value for name, value in rates.items()}
     return {**document, "touch": blocks, "scene": still}, arrays
 
 
-def _made_by_wall(contact: ContactSimulation) -> Floats:
+def _energy_made_by_wall(contact: ContactSimulation) -> Floats:
     """Energy that the wall has made since the start, at each sample [J]; negative: taken out.
 
     What it gave to the device, less what its spring had stored at the start and has not now: an ideal spring makes
@@ -160,11 +166,17 @@ def measured_points(opened: OpenedDevices, request: PointsRequest) -> Contents:
     if request.file not in opened.texts:
         raise BadInput(f"{request.file} has not been sent by the page; open it once more")
     points = read_points(request.file)
-    walls = np.array([(one.stiffness, one.damping) for one in points])
+    walls = np.array([(measured.stiffness, measured.damping) for measured in points])
     checked = opened.point(request.state).check(walls[:, 0], walls[:, 1])
-    spread = [(one.damping_low, one.damping_high, one.stiffness_low, one.stiffness_high) for one in points]
-    words = [{"edge": one.edge, "verdict": one.verdict} for one in points]
-    return {"file": request.file, "points": words, "verdicts": checked.names}, {"walls": walls, "spread": spread}
+    spread = [
+        (measured.damping_low, measured.damping_high, measured.stiffness_low, measured.stiffness_high)
+        for measured in points
+    ]
+    descriptions = [{"edge": measured.edge, "verdict": measured.verdict} for measured in points]
+    return {"file": request.file, "points": descriptions, "verdicts": checked.names}, {
+        "walls": walls,
+        "spread": spread,
+    }
 
 
 def export(opened: OpenedDevices, request: ExportRequest) -> Contents:
@@ -183,13 +195,13 @@ def kept_figure(opened: OpenedDevices, request: ExportRequest) -> bytes:
     from zwidth.show.figures.style import save
 
     chart = opened.point(request.state).chart()
-    axes = chart.plot(_axes())
+    axes = chart.plot(_new_axes())
     assert isinstance(axes.figure, Figure)
     with TemporaryDirectory() as folder:
         return save(axes.figure, Path(folder) / f"chart.{request.format}").read_bytes()
 
 
-def _axes() -> Any:
+def _new_axes() -> Any:
     """The axes of a new figure of zwidth's style."""
     from zwidth.show.figures.style import figure
 
@@ -244,7 +256,7 @@ def python_lines(state: State, point: OperatingPoint) -> str:
     lines.append(f"device = zwidth.load({', '.join(arguments)})")
     where = []
     if point.mechanism is not None:
-        where += [f"{name}={value!r}" for name, value in _place(state) if value is not None]
+        where += [f"{name}={value!r}" for name, value in _placement_arguments(state) if value is not None]
     if state.model:
         where.append(f"model={state.model!r}")
     if state.hand is not None:
@@ -260,7 +272,7 @@ def python_lines(state: State, point: OperatingPoint) -> str:
     return "\n".join([*lines, ""])
 
 
-def _place(state: State) -> list[tuple[str, Any]]:
+def _placement_arguments(state: State) -> list[tuple[str, Any]]:
     """Name and value of the arguments of `Device.at` that say where the device stands; None: left out."""
     return [
         ("position", state.position),

@@ -78,7 +78,7 @@ class Workbench:
 
     @property
     def _state(self) -> State | None:
-        """The state of the page that asked last, if it is one of this device."""
+        """The state of the page that was moved last; None before any, and if it shows another device."""
         state: State | None = self._server.config.app.state.received.get("state")  # type: ignore[union-attr]
         return state if state is not None and state.from_file else None
 

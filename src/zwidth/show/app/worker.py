@@ -40,7 +40,7 @@ class ComputeProcess:
     def __init__(self) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="zwidth-app-"))
         self.process: asyncio.subprocess.Process | None = None
-        self._ready: asyncio.Task[None] | None = None
+        self._ready: asyncio.Task[None] | None = None  # waits for the message that it has started, or forgotten
         self._answering = False
 
     async def start(self) -> None:
@@ -154,7 +154,7 @@ class SparePool:
     def __init__(self) -> None:
         self._spares: list[ComputeProcess] = []
         self._lock = asyncio.Lock()
-        self._next: asyncio.Task[None] | None = None
+        self._next: asyncio.Task[None] | None = None  # starts the next spare process
         self._ended = False
 
     async def prepare(self) -> None:
@@ -221,7 +221,7 @@ def compute_answers() -> None:
         send(READY)
         while (length := _request_length(received)) is not None:
             if not length:  # for another page
-                _empty(folder)
+                _empty_folder(folder)
                 answers = new_answers()
                 send(READY)
                 continue
@@ -242,7 +242,7 @@ def _request_length(received: BinaryIO) -> int | None:
     return int.from_bytes(head, "little")
 
 
-def _empty(folder: Path) -> None:
+def _empty_folder(folder: Path) -> None:
     """Remove all files of a folder."""
     for file in folder.iterdir():
         file.unlink()

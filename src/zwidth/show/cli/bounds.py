@@ -57,7 +57,7 @@ class BoundsCommand(Command):
 
     def pages(self, case: CommandLine, result: BoundsComparison, document: Mapping[str, Any]) -> Iterator[Any]:
         """The exact answer, a row for each condition that speaks, and what the others lack."""
-        yield two_columns(list(_exact(result)))
+        yield two_columns(list(_exact_rows(result)))
         speaking = [bound for bound in result.bounds if not bound.lacking]
         # the assumptions not met, in the order in which they come up, numbered from 1
         unmet = list(dict.fromkeys(sentence for bound in speaking for sentence in bound.violated))
@@ -73,20 +73,20 @@ class BoundsCommand(Command):
         if unmet:
             yield "not met here:"
             yield two_columns([(f"{n}", sentence) for n, sentence in enumerate(unmet, start=1)])
-        silent = [(bound.name, _needs(bound)) for bound in result.bounds if bound.lacking]
+        silent = [(bound.name, _lacking_text(bound)) for bound in result.bounds if bound.lacking]
         if silent:
             yield "not applied, because the device lacks what they need:"
             yield two_columns(silent)
 
 
-def _exact(comparison: BoundsComparison) -> Iterator[tuple[str, str]]:
-    """Rows on the exact answer: the largest stiffness at the damping compared, and of all dampings."""
+def _exact_rows(comparison: BoundsComparison) -> Iterator[tuple[str, str]]:
+    """Rows (label, value) on the exact answer: the largest stiffness at the damping compared, and of all."""
     if comparison.chart is None:
         yield "exact", f"undecided: {comparison.undecided}"
         return
-    yield f"exact, at {amount(comparison.damping, 'N s/m')}", _stiffness(comparison.exact)
+    yield f"exact, at {amount(comparison.damping, 'N s/m')}", _stiffness_text(comparison.exact)
     at = f" at {amount(comparison.damping_at_largest, 'N s/m')}" if comparison.largest > 0.0 else ""
-    yield "exact, largest", _stiffness(comparison.largest) + at
+    yield "exact, largest", _stiffness_text(comparison.largest) + at
 
 
 def _row(comparison: BoundsComparison, bound: Bound, unmet: list[str]) -> tuple[str, ...]:
@@ -94,24 +94,24 @@ def _row(comparison: BoundsComparison, bound: Bound, unmet: list[str]) -> tuple[
 
     unmet  assumptions that the device does not meet; a cell names those of this condition by their numbers from 1
     """
-    ratio = comparison.ratio(bound)
+    ratio = comparison.ratio(bound)  # nan where the exact largest stiffness is 0, or either is not known
     return (
         bound.name,
         f"{bound.kind}, {bound.claim}",
-        _stiffness(comparison.stiffness_max(bound)),
+        _stiffness_text(comparison.stiffness_max(bound)),
         "-" if ratio != ratio else typed(number(ratio)),
-        _stiffness(bound.stiffness_max),
+        _stiffness_text(bound.stiffness_max),
         " ".join(str(unmet.index(sentence) + 1) for sentence in bound.violated) or "-",
     )
 
 
-def _stiffness(value: float) -> str:
-    """A largest stiffness; "-" where nothing is said, "none" where none is admitted."""
-    if value != value:
+def _stiffness_text(value: float) -> str:
+    """A largest stiffness [N/m] in words; "-" for nan, of which nothing is said, "none" where none is admitted."""
+    if value != value:  # nan
         return "-"
     return amount(value, "N/m") if value > 0.0 else "none"
 
 
-def _needs(bound: Bound) -> str:
+def _lacking_text(bound: Bound) -> str:
     """What a condition needs and the device lacks, in words."""
     return ", ".join(LACKED.get(name, name) for name in bound.lacking)

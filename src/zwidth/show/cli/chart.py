@@ -73,14 +73,16 @@ class ChartCommand(Command):
         return wall_law.circumstances(case)
 
     def compute(self, case: CommandLine) -> Chart:
-        return wall_law.operating_point(case).chart().drawn()
+        return wall_law.operating_point(case).chart().drawn()  # its outlines too, while errors are translated
 
     def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
         """The chart's own document; of a measured response with the warning that it was cut short."""
         from zwidth.chart.measured.chart import MeasuredChart
 
-        more: dict[str, Any] = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
-        return result.document() | more
+        warning: dict[str, Any] = (
+            {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
+        )
+        return result.document() | warning
 
     def reason(self, case: CommandLine, result: Chart) -> str | None:
         """Why there is no largest stiffness (nan); None where there is one."""
@@ -113,12 +115,12 @@ class ChartCommand(Command):
 
 
 def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
-    """Rows for people on every chart: largest stiffness and damping, area, fastest decay, what no wall affects."""
+    """Rows (label, value) on a chart of any kind: stiffness, damping, area, decay, what no wall affects."""
     found = " found" if getattr(chart, "doubt", "") else ""
-    yield f"largest stiffness{found}", _stiffest(chart)
-    yield f"largest damping{found}", _most_damped(chart)
+    yield f"largest stiffness{found}", _stiffest_text(chart)
+    yield f"largest damping{found}", _largest_damping_text(chart)
     yield f"stable area{found}", amount(chart.stable_area, "N^2 s/m^2")
-    yield from _decays(chart.fastest_decay_in_first_quadrant, chart.fastest_decay)
+    yield from _decay_rows(chart.fastest_decay_in_first_quadrant, chart.fastest_decay)
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
@@ -134,7 +136,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
 
 
 def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
-    """Rows on the equilibrium of a device under load."""
+    """Rows (label, value) on the equilibrium of a device under load; none without load."""
     from zwidth.chart.chart import StabilityChart
     from zwidth.show.load_text import balance_rows
 
@@ -146,13 +148,14 @@ def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
         names = ", ".join(point.drives.names[i] for i in point.equilibrium.kinked)
         yield (
             "on the other branch",
-            f"largest stiffness {_stiffest(other)} (of {names}, without torque, whose stiffness changes there; a "
-            "wall stable on both branches is not proven stable for the device that switches between them)",
+            f"largest stiffness {_stiffest_text(other)} (of {names}, without torque, whose stiffness "
+            "changes there; a wall stable on both branches is not proven stable for the device that switches "
+            "between them)",
         )
 
 
-def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iterator[tuple[str, str]]:
-    """Rows on the fastest decay: of walls with K, B >= 0, and of all walls where that is another."""
+def _decay_rows(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iterator[tuple[str, str]]:
+    """Rows (label, value) on the fastest decay: of walls with K, B >= 0, and of all if that is another wall."""
     label = "fastest decay"
     for fastest in (buildable, None if of_all == buildable else of_all):
         if fastest:
@@ -161,7 +164,7 @@ def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iter
         label = "with K or B < 0"
 
 
-def _most_damped(chart: Chart) -> str:
+def _largest_damping_text(chart: Chart) -> str:
     """The largest damping [N s/m]; why, where it is 0 although walls are stable."""
     damping = amount(chart.damping_max, "N s/m")
     if chart.damping_max > 0.0 or not chart.regions:
@@ -169,9 +172,9 @@ def _most_damped(chart: Chart) -> str:
     return f"{damping}, because walls of small stiffness are unstable at any damping"
 
 
-def _stiffest(chart: Chart) -> str:
+def _stiffest_text(chart: Chart) -> str:
     """The largest stiffness [N/m], its damping and the frequencies of its limit; "none" without a stable wall."""
-    if chart.stiffness_max != chart.stiffness_max:
+    if chart.stiffness_max != chart.stiffness_max:  # nan
         return "none"
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     return (
@@ -204,12 +207,12 @@ def unmeasured_warning(chart: MeasuredChart) -> str | None:
 
 
 def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
-    """Rows for people on a chart by a frequency response, below those of every chart."""
+    """Rows (label, value) on a chart by a frequency response, below those of every chart."""
     if chart.band is None:
         if not chart.open:
             yield "error", "not known: neither coherence nor repeated sweeps are given; these are nominal numbers"
     else:
-        yield "of the mean response", _nominal(chart)
+        yield "of the mean response", _nominal_text(chart)
         high = chart.band.stiffness_high
         limit = "not limited by the data" if high == inf else f"at most {amount(high, 'N/m')}"
         yield "error", f"{chart.band.meaning}; the largest stiffness is {limit}; area and regions are nominal"
@@ -225,9 +228,9 @@ def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
         yield "", f"and {len(chart.unusable) - SHOWN_STRETCHES} more ranges; --json lists all"
 
 
-def _nominal(chart: MeasuredChart) -> str:
-    """The largest stiffness of the response as it was measured."""
-    if chart.stiffness_max_nominal != chart.stiffness_max_nominal:
+def _nominal_text(chart: MeasuredChart) -> str:
+    """The largest stiffness [N/m] of the response as it was measured, its damping and the frequencies at it."""
+    if chart.stiffness_max_nominal != chart.stiffness_max_nominal:  # nan
         return "none"
     frequencies = " and ".join(amount(f, "Hz") for f in chart.frequencies_at_stiffness_max_nominal)
     stiffness, damping = chart.stiffness_max_nominal, chart.damping_at_stiffness_max_nominal

@@ -38,7 +38,7 @@ class CheckCommand(Command):
     takes_responses = True
 
     def parse(self, case: CommandLine) -> dict[str, Any]:
-        return {"walls": _walls(case["points"], case["stiffness"], case["damping"])}
+        return {"walls": _walls_to_judge(case["points"], case["stiffness"], case["damping"])}
 
     def repeated_options(self, case: CommandLine) -> dict[str, Any]:
         return wall_law.circumstances(case)
@@ -70,7 +70,7 @@ class CheckCommand(Command):
             yield f"and {len(points) - SHOWN} more; --json or --output holds them all"
 
 
-def _walls(points: str | None, stiffness: float | None, damping: float | None) -> Walls:
+def _walls_to_judge(points: str | None, stiffness: float | None, damping: float | None) -> Walls:
     """The walls (K [N/m], B [N s/m]) to judge: those of the file `points`, else the one of both numbers.
 
     Raises  click.UsageError  where the options give neither, or both

@@ -66,6 +66,7 @@ class CommandLine:
         return self.question.point(self.device)
 
     def __getitem__(self, option: str) -> Any:
+        """The value of an option of the command, by the name of its argument."""
         return self.options[option]
 
     def writes(self, endings: Sequence[str]) -> bool:
@@ -167,9 +168,9 @@ class Command:
         from zwidth.show.figures.plots import drawing_of, size_of
         from zwidth.show.figures.style import figure
 
-        made, ax = figure(*size_of(result))
+        drawing, ax = figure(*size_of(result))
         drawing_of(result)(ax, result)
-        return made
+        return drawing
 
     def write_others(self, case: CommandLine, result: Any) -> dict[str, Path]:
         """Write the files that options of the command's own name. Returns each by its key of the answer."""
@@ -204,9 +205,9 @@ class Command:
         from zwidth.show.figures.style import context, save
 
         with context():  # whatever settings of matplotlib the user has
-            made = draw()
-            write_caption(made, self.caption(case, document))
-            save(made, path)
+            drawing = draw()
+            write_caption(drawing, self.caption(case, document))
+            save(drawing, path)
 
     def caption(self, case: CommandLine, document: Mapping[str, Any]) -> list[str]:
         """The lines below a figure."""
@@ -220,11 +221,11 @@ class Command:
 
         return self.circumstances(case) | wall_of_document(document) | doubt_of_document(document)
 
-    def unanswered(self, case: CommandLine, none: NoAnswerError) -> Answer:
+    def unanswered(self, case: CommandLine, refusal: NoAnswerError) -> Answer:
         """The answer where there is none: every key null, and why."""
-        decided = {"decided": none.decided} if self.may_be_undecided else {}
+        decided = {"decided": refusal.decided} if self.may_be_undecided else {}
         return Answer(
-            self.spoken(case, self.circumstances(case) | dict.fromkeys(self.keys) | decided), reason=str(none)
+            self.spoken(case, self.circumstances(case) | dict.fromkeys(self.keys) | decided), reason=str(refusal)
         )
 
     def spoken(self, case: CommandLine, document: dict[str, Any]) -> dict[str, Any]:
@@ -232,8 +233,8 @@ class Command:
         if not self.is_about_moments(case):
             return document
         stated = self.circumstances(case)
-        own = {key: value for key, value in document.items() if key not in stated or _differs(value, stated[key])}
-        spoken: dict[str, Any] = keys_of_moments(own)
+        result = {k: value for k, value in document.items() if k not in stated or _differs(value, stated[k])}
+        spoken: dict[str, Any] = keys_of_moments(result)
         return stated | spoken
 
     def answer(self, case: CommandLine) -> Answer:
@@ -256,13 +257,13 @@ class Command:
         try:
             with translate_errors(case.question):
                 result = self.compute(case)
-            return self._stated(case, result)
+            return self._answer_of_result(case, result)
         except NoAnswerError as none:
             return self.unanswered(case, none)
         except ChartError as error:  # of a chart that is drawn only as it is stated
             return self.unanswered(case, NoAnswerError(f"this is undecided: {error}", decided=False))
 
-    def _stated(self, case: CommandLine, result: Any) -> Answer:
+    def _answer_of_result(self, case: CommandLine, result: Any) -> Answer:
         """The answer that a result gives; writes the output file where one is named."""
         reason = self.reason(case, result)
         document = self.circumstances(case) | self.document(case, result)
@@ -275,8 +276,8 @@ class Command:
             document["file"] = str(case.path)
             case.progress(f"writing {printable(case.path.name)}", 0, 0)
             reason = self.write(case, result, document, reason)
-        others = {key: str(path) for key, path in self.write_others(case, result).items()}
-        document |= others
+        other_files = {key: str(path) for key, path in self.write_others(case, result).items()}
+        document |= other_files
 
         spoken = self.spoken(case, document)
 
@@ -287,7 +288,7 @@ class Command:
             if isinstance(fit := document.get("fit"), dict) and self.answers_by_fit:
                 yield _fit_sentence(fit)
             yield from self.pages(case, result, document)
-            yield from (f"written: {document[key]}" for key in ("file", *others) if key in document)
+            yield from (f"written: {document[key]}" for key in ("file", *other_files) if key in document)
 
         return Answer(spoken, lambda: self._list_pages(case, pages), reason)
 
@@ -326,8 +327,8 @@ class Command:
             return self.run(*arguments, **options)
 
         run.__doc__ = self.__doc__
-        made = click.command(self.name, cls=SectionedCommand, short_help=self.summary, epilog=self.epilog())
-        return made(decorated(run, decorators))
+        declare = click.command(self.name, cls=SectionedCommand, short_help=self.summary, epilog=self.epilog())
+        return declare(decorated(run, decorators))
 
 
 def _fit_sentence(fit: Mapping[str, Any]) -> str:

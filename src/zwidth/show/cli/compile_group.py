@@ -68,8 +68,9 @@ def write_devices(folder: Path) -> None:
 def measured_response(period: float = 0.001, mass: float = 0.1, friction: float = 0.5) -> str:
     """A response file: a mass with friction, from force command to encoder sample through a zero-order hold.
 
-    H(z) = x1 / (z - 1) + ...;  P(s) = 1 / (s (m s + b)), pole p = exp(-b T / m)
-    H(z) = (1/b) [T / (z - 1) - (m/b) (1 - p) / (z - p)]
+    Of P(s) = 1/(s (m s + b)) with the period T [s], mass m [kg] and friction b [N s/m], at 1 to 499 Hz:
+
+        H(z) = (1/b) [T/(z - 1) - (m/b) (1 - p)/(z - p)],  p = exp(-b T/m)
     """
     pole = cmath.exp(-friction * period / mass).real
     lines = ["frequency_Hz,real_m_per_N,imag_m_per_N"]
@@ -106,10 +107,20 @@ def identify_friction_of_a_step() -> None:
 
     from zwidth.identify.joint.fit import JointNumbers, Windows, predict
 
-    force, one = np.repeat([1.0, -1.0], 20), np.array([40])
+    force, row_count = np.repeat([1.0, -1.0], 20), np.array([40])
+    # position, force, first row, number of rows, period, time, run, whether a force was recorded, clock
     windows = Windows(
-        force, force, np.array([0]), one, np.array([0.001]), np.zeros(1), np.zeros(1, int), True, np.zeros(40)
+        force,
+        force,
+        np.array([0]),
+        row_count,
+        np.array([0.001]),
+        np.zeros(1),
+        np.zeros(1, int),
+        True,
+        np.zeros(40),
     )
+    # mass, viscous and dry friction both ways, stiffness, delay, and three numbers of drift; from rest at 0
     predict(
         windows,
         JointNumbers(np.array([0.1, 0.2, 0.2, 0.3, 0.3, 4.0, 0.001, 0.1, 0.0, 0.0]), ()).values,
@@ -117,7 +128,7 @@ def identify_friction_of_a_step() -> None:
     )
 
 
-def margins_of_chords() -> None:
+def find_margins_by_chords() -> None:
     """Find the stiffest wall with margins by the stage for edges that compiled stages left in doubt."""
     import numpy as np
 
@@ -126,13 +137,13 @@ def margins_of_chords() -> None:
     from zwidth.loop.loop import Loop
     from zwidth.model.plant import Plant
 
-    one, none = np.ones(1), np.zeros((1, 1))
-    stiffness_with_chords([Loop(Plant(0.1 * one[:, None], none, none, one, one), Controller(0.001))], 1.1, 1.1)
+    one, zero = np.ones(1), np.zeros((1, 1))
+    stiffness_with_chords([Loop(Plant(0.1 * one[:, None], zero, zero, one, one), Controller(0.001))], 1.1, 1.1)
 
 
 # What no short command line reaches, by group.
 RARE: Final[tuple[tuple[Callable[[], None], ...], ...]] = (
-    (compile_environments, run_estimators, identify_friction_of_a_step, margins_of_chords),
+    (compile_environments, run_estimators, identify_friction_of_a_step, find_margins_by_chords),
     (),
 )
 

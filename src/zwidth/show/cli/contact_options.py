@@ -73,13 +73,14 @@ def contact_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
     """The options of a contact as arguments of `simulate_contact`. Raises BadInput for numbers that cannot be."""
     from zwidth.contact.hand import Reach, Reflex, Tremor
 
-    parameters = _by_name(options["parameters"])
+    parameters = _values_by_name(options["parameters"])
     tremor, reach, reflex = options["tremor"], options["reach"], options["reflex"]
-    with _name_option("tremor"):
+    with _errors_naming("tremor"):
         tremor = tremor and Tremor(*tremor)
-    with _name_option("reach"):
+    with _errors_naming("reach"):
         reach = reach and Reach(*reach)
-    with _name_option("reflex"):
+    # threshold of force, stiffness and damping of the stiffened arm, and perhaps latency and rise time
+    with _errors_naming("reflex"):
         reflex = reflex and Reflex(
             reflex[0],
             arm_stiffness=reflex[1],
@@ -112,11 +113,11 @@ def environment_from_options(
 
     with translate_contact_errors():
         return environment_with_values(
-            name, _by_name(parameters), stiffness=stiffness, damping=damping, no_pull=no_pull
+            name, _values_by_name(parameters), stiffness=stiffness, damping=damping, no_pull=no_pull
         )
 
 
-def _by_name(parameters: Sequence[tuple[str, float]]) -> dict[str, float]:
+def _values_by_name(parameters: Sequence[tuple[str, float]]) -> dict[str, float]:
     """Values of --parameter by name. Raises BadInput for those given twice."""
     names = [name for name, _ in parameters]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -126,7 +127,7 @@ def _by_name(parameters: Sequence[tuple[str, float]]) -> dict[str, float]:
 
 
 @contextmanager
-def _name_option(option: str) -> Iterator[None]:
+def _errors_naming(option: str) -> Iterator[None]:
     """Turn errors in an option's numbers into messages that name the option."""
     try:
         yield
@@ -136,7 +137,7 @@ def _name_option(option: str) -> Iterator[None]:
 
 @contextmanager
 def translate_contact_errors() -> Iterator[None]:
-    """Simulate a contact inside this block.
+    """Turn errors of a contact's simulation inside this block into messages about the options as they were typed.
 
     Raises  BadInput  for what `simulate_contact` does not take, under the options' names
             NoAnswerError  where the environment gives no force

@@ -36,7 +36,7 @@ class UnfinishedRun(errors.ZwidthError):
 
 @contextmanager
 def translate_errors(question: Question) -> Iterator[None]:
-    """Compute inside this block.
+    """Turn errors of a computation inside this block into messages about the question as it was typed.
 
     Raises  NoAnswerError  where the posture does not exist, or double precision cannot decide
             BadInput  where the model, or the loop, does not fit the device
@@ -77,7 +77,7 @@ def explain(error: Exception) -> tuple[list[str], int]:
     """The lines for standard error, and the exit code, of any error that a command raises."""
     match error:
         case errors.DeviceError():
-            return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
+            return [str(_as_set_option(fault)) for fault in error.faults], BAD_INPUT
         case BadInput() | errors.FileError():
             return [printable(line) for line in error.lines], BAD_INPUT
         case errors.ProcessorError():
@@ -89,19 +89,19 @@ def explain(error: Exception) -> tuple[list[str], int]:
         case click.Abort():
             return ["zwidth: interrupted"], INTERRUPTED
         case click.ClickException():
-            return [_usage(error)], BAD_INPUT
+            return [_usage_line(error)], BAD_INPUT
         case OSError() if not os.environ.get(DEBUG) and error.filename is None:
             return [f"zwidth: standard output cannot be written: {error.strerror or error}"], BAD_INPUT
         case _:
-            return _internal(error), INTERNAL
+            return _internal_error_lines(error), INTERNAL
 
 
-def _as_typed(fault: Fault) -> Fault:
+def _as_set_option(fault: Fault) -> Fault:
     """The fault; one of the settings as a fault of the option --set, which gives them."""
     return replace(fault, file="--set") if fault.file == SETTINGS else fault
 
 
-def _usage(error: click.ClickException) -> str:
+def _usage_line(error: click.ClickException) -> str:
     """A usage error on one line, with the command it happened in and the way to its help."""
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "zwidth"
@@ -110,7 +110,7 @@ def _usage(error: click.ClickException) -> str:
     return f"{command}: {text[:1].lower() + text[1:]}{mark} `{command} --help` shows what is allowed"
 
 
-def _internal(error: Exception) -> list[str]:
+def _internal_error_lines(error: Exception) -> list[str]:
     """Lines on an error of zwidth itself: what it is and to report it; with ZWIDTH_DEBUG the traceback."""
     if os.environ.get(DEBUG):
         return traceback.format_exception(error)

@@ -66,7 +66,7 @@ class ExperimentCommand(Command):
         from zwidth.errors import StoreError
         from zwidth.study.boundary.experiment import measure_boundary
 
-        file = _journal(case)
+        file = _journal_file(case)
         try:
             with _report_kept_work(file):
                 return measure_boundary(
@@ -85,12 +85,13 @@ class ExperimentCommand(Command):
     ) -> str | None:
         """Write the file as every command does; then remove the finished work, unless --resume names its file."""
         reason = super().write(case, result, document, reason)
-        file = _journal(case)
+        file = _journal_file(case)
         if case["file"] is None and file is not None:
             file.unlink(missing_ok=True)  # now that what it kept is written
         return reason
 
     def pages(self, case: CommandLine, result: Experiment, document: Mapping[str, Any]) -> Iterator[Any]:
+        """A warning, a row for each measured point, and sentences on the boundary."""
         if document["warning"]:
             yield f"warning: {document['warning']}"
         headings, rows = point_rows(result)
@@ -111,15 +112,14 @@ def _plan(case: CommandLine) -> Plan:
         raise BadInput(
             "--disturbance: applies to a two-sided wall; against a one-sided wall use --push and --speed"
         )
-    numbers = [
-        one.name for one in fields(Plan) if one.name in EXPERIMENT
-    ]  # the options that are numbers of the plan
+    # the options that are numbers of the plan
+    numbers = [number.name for number in fields(Plan) if number.name in EXPERIMENT]
     given = {name: case[name] for name in numbers if case[name] is not None}
     box = None if stiffness is None else SearchWindow(stiffness, damping)
     return Plan.touching(box=box, **given) if one_sided else Plan(box=box, **given)
 
 
-def _journal(case: CommandLine) -> Path | None:
+def _journal_file(case: CommandLine) -> Path | None:
     """The file that keeps what is done: --resume, or one beside --output; None: nothing is kept."""
     if case["file"] is not None:
         return Path(case["file"])
@@ -138,7 +138,7 @@ def _report_kept_work(file: Path | None) -> Iterator[None]:
 
 
 MATTERS: Final = 0.01  # of the range of stable dampings: what moves an edge by less is not named
-AGREES: Final = 1e-3  # largest `deviation` of edges that agree, see `_difference`
+AGREES: Final = 1e-3  # largest `deviation` of edges that agree, see `_difference_sentence`
 BEHAVIOUR_WORDS: Final = {
     "growing": "a vibration that grows",
     "limit cycle": "a vibration that keeps its size",
@@ -152,24 +152,31 @@ BEHAVIOUR_WORDS: Final = {
 
 def point_rows(experiment: Experiment) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of the table of measured points."""
-    many, doubts = any(p.trials > 1 for p in experiment.points), any(p.unsure for p in experiment.points)
+    repeated, any_unsure = (
+        any(point.trials > 1 for point in experiment.points),
+        any(point.unsure for point in experiment.points),
+    )
     rows = []
-    for p in experiment.points:
-        unit = "N/m" if p.edge == "tip" else "N s/m"
+    for point in experiment.points:
+        unit = "N/m" if point.edge == "tip" else "N s/m"
         rows.append(
             [
-                p.edge,
-                amount(p.stiffness, "N/m"),
-                amount(p.damping, "N s/m"),
-                *([f"{amount(p.low, unit)} to {amount(p.high, unit)}", str(p.trials)] if many else []),
-                amount(p.exact, unit),
-                str(p.beyond),
-                amount(p.frequency, "Hz"),
-                *(["unsure" if p.unsure else ""] if doubts else []),
+                point.edge,
+                amount(point.stiffness, "N/m"),
+                amount(point.damping, "N s/m"),
+                *(
+                    [f"{amount(point.low, unit)} to {amount(point.high, unit)}", str(point.trials)]
+                    if repeated
+                    else []
+                ),
+                amount(point.exact, unit),
+                str(point.beyond),
+                amount(point.frequency, "Hz"),
+                *(["unsure" if point.unsure else ""] if any_unsure else []),
             ]
         )
-    spread = ["lowest to highest", "trials"] if many else []
-    marks = [""] if doubts else []
+    spread = ["lowest to highest", "trials"] if repeated else []
+    marks = [""] if any_unsure else []
     return ["edge", "stiffness", "damping", *spread, "exact, linear", "beyond it", "at", *marks], rows
 
 
@@ -191,7 +198,7 @@ def experiment_warning(experiment: Experiment) -> str | None:
 
 
 def experiment_sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
-    """Rows below the points: labels and values."""
+    """Rows (label, value) below the points."""
     best = experiment.stiffest
     if best is not None and best.edge == "tip":
         doubt = ", unsure" if best.unsure else ""
@@ -203,9 +210,9 @@ def experiment_sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
             "not found",
             f"{experiment.not_found} of the points: no unstable wall, or no stable one, was found there",
         )
-    doubtful = [p.edge == "tip" for p in experiment.points if p.unsure]
+    doubtful = [point.edge == "tip" for point in experiment.points if point.unsure]
     if doubtful:
-        yield "unsure", _doubt(doubtful, single=len(experiment.subjects) * experiment.plan.trials == 1)
+        yield "unsure", _doubt_sentence(doubtful, single=len(experiment.subjects) * experiment.plan.trials == 1)
     for n, text in enumerate(explanation(experiment)):
         yield "" if n else "difference", text
     if experiment.user_points is not None:
@@ -213,7 +220,7 @@ def experiment_sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
             yield "" if n else "your points", text
 
 
-def _doubt(tips: list[bool], *, single: bool) -> str:
+def _doubt_sentence(tips: list[bool], *, single: bool) -> str:
     """Sentence on the unsure points.
 
     tips    of each: whether it is a tip, not an edge;   single  whether each was measured by one trial only
@@ -228,19 +235,20 @@ def _doubt(tips: list[bool], *, single: bool) -> str:
 
 def explanation(experiment: Experiment) -> list[str]:
     """Comparison of the measured edges with the exact linear ones, and the parts of the device that explain it."""
-    difference = [_difference(experiment)] if experiment.chart is not None else []
-    return difference + [_cause(cause, experiment.damping_range) for cause in experiment.causes]
+    difference = [_difference_sentence(experiment)] if experiment.chart is not None else []
+    return difference + [_cause_sentence(cause, experiment.damping_range) for cause in experiment.causes]
 
 
-def _difference(experiment: Experiment) -> str:
+def _difference_sentence(experiment: Experiment) -> str:
     """Sentence on the point farthest from its exact edge or tip, and on the motion of walls beyond it."""
     compared = experiment.compared_points
     if not compared:
         return "no measured edge has an exact one beside it"
     worst = max(compared, key=experiment.deviation)
     if experiment.deviation(worst) <= AGREES:
-        return f"measured and exact linear edges agree within {_gaps(compared)}"
+        return f"measured and exact linear edges agree within {_gaps_text(compared)}"
     tip = worst.edge == "tip"
+    # a tip or an upper edge that lies higher than the exact one leaves more walls stable, a lower edge fewer
     larger = (worst.bisected_value > worst.exact) == (worst.edge != "lower")
     at = amount(worst.damping, "N s/m") if tip else amount(worst.stiffness, "N/m")
     unit = "N/m" if tip else "N s/m"
@@ -252,7 +260,7 @@ def _difference(experiment: Experiment) -> str:
     )
 
 
-def _gaps(points: list[MeasuredPoint]) -> str:
+def _gaps_text(points: list[MeasuredPoint]) -> str:
     """The largest distance from the exact edges [N s/m], and that from the exact tips [N/m]."""
     edges = [abs(p.damping - p.exact) for p in points if p.edge != "tip"]
     tips = [abs(p.stiffness - p.exact) for p in points if p.edge == "tip"]
@@ -261,7 +269,7 @@ def _gaps(points: list[MeasuredPoint]) -> str:
     return " and ".join(gaps)
 
 
-def _cause(cause: Cause, width: float) -> str:
+def _cause_sentence(cause: Cause, width: float) -> str:
     """Sentence on one part of the device: how the measured edges move without it.
 
     width  of the range of stable dampings [N s/m], which says whether a move matters
@@ -273,6 +281,7 @@ def _cause(cause: Cause, width: float) -> str:
         if cause.unpaired_count:
             return f"without {cause.name} {cause.unpaired_count} of the edges tried appear or vanish"
         return f"without {cause.name} no edge tried moves by more than {100 * MATTERS:g} % of the range"
+    # with the part in place more walls are stable: its upper edge is higher, or its lower edge lower
     holds = (point.damping > other) == (point.edge == "upper")
     return (
         f"without {cause.name} {'fewer' if holds else 'more'} walls are stable: the {point.edge} edge at "
@@ -285,10 +294,10 @@ def own_point_sentences(comparison: PointsComparison) -> Iterator[str]:
     if all(one.exact_verdict is None for one in comparison.points):
         yield f"{len(comparison.points)} points; there is no exact chart to compare them with"
         return
-    yield from _edges(comparison.edges)
+    yield from _edge_point_sentences(comparison.edges)
     for verdict in ("stable", "unstable"):
-        yield from _tried_walls(comparison.walls(verdict), verdict)
-    yield from _unclassified_points(comparison.unnamed)
+        yield from _tried_wall_sentences(comparison.walls(verdict), verdict)
+    yield from _unclassified_point_sentences(comparison.unnamed)
 
 
 def _distances(points: Sequence[ComparedPoint]) -> list[float]:
@@ -296,25 +305,26 @@ def _distances(points: Sequence[ComparedPoint]) -> list[float]:
     return [abs(one.deviation) for one in points if not isnan(one.deviation)]
 
 
-def _edges(points: Sequence[ComparedPoint]) -> Iterator[str]:
+def _edge_point_sentences(points: Sequence[ComparedPoint]) -> Iterator[str]:
     """Sentences on points on an edge: how far they are from the exact one, and how many have none beside them."""
     beside = _distances([one for one in points if one.point.edge != "tip"])
     tips = _distances([one for one in points if one.point.edge == "tip"])
     for apart, name, unit in ((beside, "edge point", "N s/m"), (tips, "tip", "N/m")):
         if apart:
-            yield f"{_count(len(apart), name)}: {_average(apart, unit)} from the exact edge"
+            yield f"{_count_text(len(apart), name)}: {_average_text(apart, unit)} from the exact edge"
     nowhere = len(points) - len(beside) - len(tips)
     if nowhere:
-        yield f"{_count(nowhere, 'edge point')} where the exact chart has no such edge: left out of the average"
+        unmatched = _count_text(nowhere, "edge point")
+        yield f"{unmatched} where the exact chart has no such edge: left out of the average"
 
 
-def _tried_walls(points: Sequence[ComparedPoint], verdict: str) -> Iterator[str]:
+def _tried_wall_sentences(points: Sequence[ComparedPoint], verdict: str) -> Iterator[str]:
     """Walls of which a verdict was seen: how many have it on the exact chart; of the others the farthest off."""
     if not points:
         return
     agreeing = sum(one.agrees is True for one in points)
     against = [one for one in points if one.agrees is False]
-    text = f"{_count(len(points), 'wall')} seen {verdict}: {agreeing} {verdict} on the exact chart, too"
+    text = f"{_count_text(len(points), 'wall')} seen {verdict}: {agreeing} {verdict} on the exact chart, too"
     undecided = len(points) - agreeing - len(against)
     text += f", {undecided} on its edge" if undecided else ""
     if against:
@@ -326,27 +336,30 @@ def _tried_walls(points: Sequence[ComparedPoint], verdict: str) -> Iterator[str]
     yield text
 
 
-def _unclassified_points(points: Sequence[ComparedPoint]) -> Iterator[str]:
+def _unclassified_point_sentences(points: Sequence[ComparedPoint]) -> Iterator[str]:
     """Sentence on points without edge or verdict: how many lie inside the exact stable set, how far from it."""
     if not points:
         return
     inside = sum(one.exact_verdict == "stable" for one in points)
     apart = _distances(points)
-    far = f", {_average(apart, 'N s/m')} from the nearest exact edge" if apart else ""
+    far = f", {_average_text(apart, 'N s/m')} from the nearest exact edge" if apart else ""
     yield (
-        f"{_count(len(points), 'point')} without `edge` or `verdict`: {inside} inside the exact stable set, "
+        f"{_count_text(len(points), 'point')} without `edge` or `verdict`: {inside} inside the exact stable set, "
         f"{len(points) - inside} outside{far}; give each an edge (lower, upper, tip) or a verdict (stable, "
         "unstable) to have it counted"
     )
 
 
-def _average(apart: list[float], unit: str) -> str:
+def _average_text(apart: list[float], unit: str) -> str:
+    """Average and largest of distances in words."""
     return f"on average {amount(sum(apart) / len(apart), unit)} and at most {amount(max(apart), unit)}"
 
 
 def _wall_text(one: ComparedPoint) -> str:
+    """Stiffness and damping of a point in words."""
     return f"{amount(one.point.stiffness, 'N/m')} and {amount(one.point.damping, 'N s/m')}"
 
 
-def _count(number: int, name: str) -> str:
+def _count_text(number: int, name: str) -> str:
+    """A number of things of this name, in the plural where they are not one."""
     return f"{number} {name}{'s' * (number != 1)}"

@@ -181,6 +181,7 @@ class ExportCommand(Command):
         return reason
 
     def caption(self, case: CommandLine, document: Mapping[str, Any]) -> list[str]:
+        """The lines below every command's figure, and one on what the walls hold for."""
         held = ", ".join("nobody" if hand == "none" else hand for hand in document["hands"])
         margin = f", gains off by {100.0 * document['margin']:.3g} %" if document["margin"] else ""
         return [*super().caption(case, document), f"stable in every direction, held by {held}{margin}"]
@@ -199,7 +200,8 @@ class ExportCommand(Command):
         return ""  # the pages say what cells hold for
 
     def pages(self, case: CommandLine, result: SafeWalls, document: Mapping[str, Any]) -> Iterator[Any]:
-        yield f"{printable(result.device.name)}: walls that are stable {_for_whom(result)}"
+        """What the walls hold for, rows on the table, and why cells have no value."""
+        yield f"{printable(result.device.name)}: walls that are stable {_scope_text(result)}"
         if document["left_out"]:
             yield from omissions(case.device, case.question.model)
         yield two_columns(list(_rows(result)))
@@ -225,7 +227,7 @@ def _check_sketch(name: str, device: Device) -> None:
         raise BadInput(f"--arduino: {printable(name)}: {obstacle}")
 
 
-def _for_whom(table: SafeWalls) -> str:
+def _scope_text(table: SafeWalls) -> str:
     """What the walls of a table hold for, in words: postures, directions, and who holds the device."""
     where = "in every posture of a cell, " if table.grid.dimensions else ""
     along = "in every direction, " if table.grid.dimensions else ""
@@ -234,8 +236,8 @@ def _for_whom(table: SafeWalls) -> str:
 
 
 def _rows(table: SafeWalls) -> Iterator[tuple[str, str]]:
-    """Rows on a table of safe walls: cells, stiffness, walls safe in all cells, margin, directions, size."""
-    grid, K = table.grid, table.rectangles[table.level > 0, 0]
+    """Rows (label, value) on a table: cells, stiffness, walls safe in all cells, margin, directions, size."""
+    grid, K = table.grid, table.rectangles[table.level > 0, 0]  # largest stiffness of each cell with safe walls
     if grid.dimensions:
         cells = " x ".join(map(str, grid.counts))
         yield "cells", f"{int((table.level > 0).sum())} of {cells} have safe walls"
@@ -245,10 +247,13 @@ def _rows(table: SafeWalls) -> Iterator[tuple[str, str]]:
         else f"{amount(float(K.min()), 'N/m')} to " + amount(float(K.max()), "N/m")
     )
     yield "largest stiffness", spread
-    one = table.outside
-    if one.stiffness > 0.0:
-        limits = f"{amount(one.low, 'N s/m')} to {amount(one.high, 'N s/m')}"
-        yield "safe in all of them", f"stiffness up to {amount(one.stiffness, 'N/m')} with damping of {limits}"
+    safe_everywhere = table.outside
+    if safe_everywhere.stiffness > 0.0:
+        limits = f"{amount(safe_everywhere.low, 'N s/m')} to {amount(safe_everywhere.high, 'N s/m')}"
+        yield (
+            "safe in all of them",
+            f"stiffness up to {amount(safe_everywhere.stiffness, 'N/m')} with damping of {limits}",
+        )
     elif grid.dimensions:
         yield "safe in all of them", "no wall: outside the table there is no force"
     if table.question.margin:

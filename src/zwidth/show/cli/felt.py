@@ -80,7 +80,7 @@ class FeltCommand(Command):
 
 
 def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
-    """Rows on a felt wall: its verdict, what is felt at rest and in free motion, and the limit of that."""
+    """Rows (label, value) on a wall: its verdict, what is felt at rest and in free motion, the limit at rest."""
     from zwidth.measures.felt import LIMIT_HEADINGS, LIMIT_WORDS
 
     wall = f"{amount(felt_wall.wall_stiffness, 'N/m')}, {amount(felt_wall.wall_damping, 'N s/m')}"
@@ -89,7 +89,7 @@ def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
         stiffness = felt_wall.wall_stiffness
         share = f" ({typed(percent(felt_wall.static_stiffness / stiffness))} of it)" if stiffness else ""
         yield "felt at rest", amount(felt_wall.static_stiffness, "N/m") + share
-    if felt_wall.free_motion_mass == felt_wall.free_motion_mass:
+    if felt_wall.free_motion_mass == felt_wall.free_motion_mass:  # not nan
         yield "felt in free motion", amount(felt_wall.free_motion_mass, "kg")
     if felt_wall.stiffness_max is not None:
         hardest = amount(felt_wall.static_stiffness_at_stiffness_max, "N/m")

@@ -49,7 +49,11 @@ class KernelTimes(NamedTuple):
 
 
 class Progress:
-    """Kernels being compiled: how many are done, and the time that the rest takes, on standard error."""
+    """Kernels being compiled: how many are done, and the time that the rest takes, on standard error.
+
+    missing    kernel that is not compiled yet -> time that it takes [s]
+    processes  how many compile at the same time
+    """
 
     def __init__(self, missing: dict[str, float], processes: int) -> None:
         self.missing, self.done = missing, 0
@@ -84,7 +88,7 @@ class Progress:
 def announce_compiling(command: str) -> Iterator[Callable[[], bool]]:
     """Have a command say so when it has to compile, how long that takes and what remains.
 
-    Yields whether kernels are being compiled now
+    Yields a function that says whether kernels are being compiled now
     """
     progress: list[Progress] = []
 

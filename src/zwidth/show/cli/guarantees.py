@@ -63,9 +63,13 @@ class GuaranteesCommand(Command):
 
     def pages(self, case: CommandLine, result: Guarantees, document: Mapping[str, Any]) -> Iterator[Any]:
         """A row for each guarantee, the premises that are not known, and the couplings where they are wanted."""
-        withheld = result.refusal
+        withheld = result.refusal  # said of all guarantees at once, below the rows
         rows = [
-            (one.name, "none" if one.region.reason == withheld is not None else _largest(one.region), one.meaning)
+            (
+                one.name,
+                "none" if one.region.reason == withheld is not None else _stiffest_text(one.region),
+                one.meaning,
+            )
             for one in result.guarantees
         ]
         yield answer_table(["guarantee", "largest stiffness", "what it means"], rows)
@@ -77,7 +81,7 @@ class GuaranteesCommand(Command):
             yield f"couplings: {coupled.reason}"
             return
         yield answer_table(
-            ["coupling", "stiffest"], [(name, _largest(one)) for name, one in coupled.regions.items()]
+            ["coupling", "stiffest"], [(name, _stiffest_text(one)) for name, one in coupled.regions.items()]
         )
         if coupled.limit is not None:
             yield _limit_sentence(coupled.limit)
@@ -97,7 +101,7 @@ class GuaranteesCommand(Command):
         return drawing
 
 
-def _largest(region: Region) -> str:
+def _stiffest_text(region: Region) -> str:
     """The stiffest wall of a region with its damping, and the warning on it; or why there is none."""
     if region.reason is not None:
         return f"none: {region.reason}"

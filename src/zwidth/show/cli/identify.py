@@ -66,9 +66,9 @@ class IdentifyCommand(Command):
 
     def for_click(self) -> click.Command:
         """The command as click knows it, with --write after the options of all commands."""
-        made = super().for_click()
-        made.params.append(_write)
-        return made
+        command = super().for_click()
+        command.params.append(_write)
+        return command
 
     def check(self, case: CommandLine) -> None:
         """Raise BadInput where --write is given and DEVICE is no file that can be written."""
@@ -82,12 +82,14 @@ class IdentifyCommand(Command):
         destination(case.question.name, (".toml",))
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        """The device, or its operating point where `takes_point`, and the files of the records."""
         files = {"files": list(case["files"])}
         if self.takes_point:
             return case.question.circumstances(case.device) | files
         return {"name": case.device.name, "device": case.question.name} | files
 
     def heading(self, case: CommandLine) -> str:
+        """The device, or its operating point where `takes_point`; then the kind, and the files of the records."""
         about = f"{self.name} from {', '.join(map(printable, case['files']))}"
         if self.takes_point:
             return f"{heading(case.question, case.device, linear=False)}\n{about}"
@@ -107,6 +109,7 @@ class IdentifyCommand(Command):
         return found
 
     def document(self, case: CommandLine, result: Identification) -> dict[str, Any]:
+        """The identification's own document, with what a load leaves out beside what the fit leaves out."""
         of_load = self.circumstances(case).get("left_out", [])
         return result.document() | {"left_out": [*of_load, *result.left_out]}
 
@@ -126,7 +129,8 @@ class IdentifyCommand(Command):
             ["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.listed]
         )
         share = result.validation
-        explained = f"{_explained(share)} of the variance explained, " if share == share else ""
+        # nothing is said of a share that is nan
+        explained = f"{_explained_text(share)} of the variance explained, " if share == share else ""
         yield f"validation: {explained}{result.validated_on}"
         yield from result.remarks
         yield from result.left_out
@@ -180,7 +184,7 @@ _write = click.Option(
 )
 
 
-def _explained(share: float) -> str:
+def _explained_text(share: float) -> str:
     """The share of the variance that a fit explains, in per cent."""
     return "over 99.9 %" if share > MOST_EXPLAINED else f"{typed(uncertain(100.0 * share))} %"
 
@@ -282,6 +286,7 @@ class ArmCommand(IdentifyCommand):
     takes_point = True
 
     def check(self, case: CommandLine) -> None:
+        """Raise BadInput for --write: these numbers are not written into a device file."""
         super().check(case)
         if case["write"]:
             from zwidth.identify.arm.identify import NOT_WRITTEN

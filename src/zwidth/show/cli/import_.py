@@ -51,6 +51,8 @@ class ImportCommand(Command):
     has_device = False
 
     def about(self, command: Callback) -> Callback:
+        """Give the command FILE, in a `Question` in place of a device."""
+
         @wraps(command)
         def with_file(file: str, **more: Any) -> int:
             """Call the command with a `Question` that has the file in place of a device."""
@@ -70,10 +72,11 @@ class ImportCommand(Command):
             )
 
     def parse(self, case: CommandLine) -> Mapping[str, Any]:
+        """The names of --fix, which can be repeated and can have several, with commas between them."""
         return {"fix": tuple(name for names in case["fix"] for name in names.split(",") if name)}
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return {}
+        return {}  # the answer is about a file, and no device yet
 
     def compute(self, case: CommandLine) -> ImportedDevice:
         """The device that the file describes; messages name options, not arguments."""
@@ -92,15 +95,17 @@ class ImportCommand(Command):
             raise DeviceError(replace(fault, message=_as_typed(fault.message)) for fault in error.faults) from None
 
     def document(self, case: CommandLine, result: ImportedDevice) -> dict[str, Any]:
+        """Numbers that the file lacks, and findings, whose arguments are spelled as options."""
         findings = [
             {"where": one.where, "what": _as_typed(one.what), "severity": one.severity} for one in result.findings
         ]
         return {"missing": result.missing, "findings": findings}
 
     def heading(self, case: CommandLine) -> str:
-        return ""
+        return ""  # the pages begin with the device that was made
 
     def pages(self, case: CommandLine, result: ImportedDevice, document: Mapping[str, Any]) -> Iterator[Any]:
+        """How many links, loops and drives there are, a row for each finding, and how to see the device."""
         mechanism = result.document["mechanism"]
         parts = [plural(len(mechanism.get(f"{one}s", [])), one) for one in ("link", "loop", "drive")]
         yield f"{printable(result.document['name'])}: {', '.join(parts)}"

@@ -89,7 +89,7 @@ class LimitCyclesCommand(Command):
         if case["plane"] is not None:
             if "encoder steps" not in parts:
                 raise BadInput(f"--plane: {name} has no encoder steps; give {_device_key(ENCODER_KEYS, case)}")
-            _plane(case)  # whether it can be drawn, before the long computation
+            _device_in_plane(case)  # whether it can be drawn, before the long computation
         return predict_limit_cycles(
             case.point,
             case["stiffness"],
@@ -100,7 +100,8 @@ class LimitCyclesCommand(Command):
         )
 
     def pages(self, case: CommandLine, result: LimitCyclePrediction, document: Mapping[str, Any]) -> Iterator[Any]:
-        yield two_columns(list(_circumstances(case, result)))
+        """The circumstances, a row for each cycle, and remarks."""
+        yield two_columns(list(_circumstance_rows(case, result)))
         if result.cycles:
             yield answer_table(_headings(result), list(_rows(result)))
         else:
@@ -116,7 +117,7 @@ class LimitCyclesCommand(Command):
 
         def draw() -> Figure:
             drawing, ax = figure()
-            draw_plane(ax, _plane(case))
+            draw_plane(ax, _device_in_plane(case))
             return drawing
 
         path = destination(case["plane"], FIGURES)
@@ -125,11 +126,11 @@ class LimitCyclesCommand(Command):
 
 
 def _device_key(keys: tuple[str, str], case: CommandLine) -> str:
-    """That of the keys that the device's file has: keys of a [plant] and of a [mechanism]."""
+    """The key for this device's file, of a pair: that of a [plant], and that of a [mechanism]."""
     return keys[case.device.mechanism is not None]
 
 
-def _plane(case: CommandLine) -> DevicePlane:
+def _device_in_plane(case: CommandLine) -> DevicePlane:
     """The device in the friction-quantisation plane, on walls of PLANE_STIFFNESSES times the stiffness.
 
     Raises  BadInput  for a wall without positive stiffness, and for a loop that has no place in the plane
@@ -145,8 +146,8 @@ def _plane(case: CommandLine) -> DevicePlane:
         raise BadInput(f"--plane: {error}") from None
 
 
-def _circumstances(case: CommandLine, prediction: LimitCyclePrediction) -> Iterator[tuple[str, str]]:
-    """Rows above the cycles: the wall, the nonlinear parts, the range of motion, the walls without hunting."""
+def _circumstance_rows(case: CommandLine, prediction: LimitCyclePrediction) -> Iterator[tuple[str, str]]:
+    """Rows (label, value) above the cycles: wall, nonlinear parts, range of motion, walls without hunting."""
     wall = f"{amount(prediction.wall_stiffness, 'N/m')}, {amount(prediction.wall_damping, 'N s/m')}"
     yield "wall", f"{wall}: {prediction.verdict} if linear"
     yield "nonlinear parts", ", ".join(prediction.nonlinear)
@@ -164,13 +165,14 @@ def _up_to(stiffness: float | None) -> str:
     return f"on walls up to {amount(stiffness, 'N/m')}" if stiffness else "on no wall"
 
 
-def _says_source(prediction: LimitCyclePrediction) -> bool:
+def _has_source_column(prediction: LimitCyclePrediction) -> bool:
     """Whether the table has a column of what each cycle is from: not where all are from the prediction."""
     return any(answer.source == "simulation" for answer in prediction.answers)
 
 
 def _headings(prediction: LimitCyclePrediction) -> list[str]:
-    source = ["from"] if _says_source(prediction) else []
+    """Headings of the table of the cycles."""
+    source = ["from"] if _has_source_column(prediction) else []
     return ["limit cycle", "frequency", *source, "speed", "commanded force", "kind", "simulated"]
 
 
@@ -182,16 +184,16 @@ def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
         yield (
             amount(cycle.amplitude, "m"),
             amount(cycle.frequency_Hz, "Hz"),
-            *(source if _says_source(prediction) else []),
+            *(source if _has_source_column(prediction) else []),
             amount(cycle.speed, "m/s"),
             "" if isnan(cycle.force_amplitude) else amount(cycle.force_amplitude, "N"),
-            _kind(cycle),
+            _kind_text(cycle),
             _simulated_text(answer),
         )
 
 
 def _simulated_text(answer: LimitCycleAnswer) -> str:
-    """What the simulation says of a cycle."""
+    """What the simulation says of a cycle; "" of one that it does not look for, as an unstable one."""
     if answer.simulated is None:
         return "" if not answer.cycle.stable or not answer.cycle.within_range else "not confirmed: not simulated"
     if answer.source == "simulation":
@@ -202,7 +204,7 @@ def _simulated_text(answer: LimitCycleAnswer) -> str:
     return ("" if answer.confirmed else "not confirmed: ") + _vibration_text(answer.simulated)
 
 
-def _kind(cycle: LimitCycle) -> str:
+def _kind_text(cycle: LimitCycle) -> str:
     """Describe a limit cycle as a user of the device would see or hear it."""
     if not cycle.within_range:
         return "beyond the range: outside what the model holds for"

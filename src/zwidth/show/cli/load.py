@@ -54,6 +54,7 @@ class LoadCommand(Command):
     takes_responses = True  # which it refuses like every device without a mechanism
 
     def check(self, case: CommandLine) -> None:
+        """Raise BadInput for --load, which the pushes stand in for."""
         if case.question.load is not None:
             raise BadInput(
                 "--load: does not apply where the push is what changes; use --push for how large it gets"
@@ -66,18 +67,20 @@ class LoadCommand(Command):
                 f"{case.question.name}: has no [mechanism], whose forces turn as it moves; use zwidth chart"
             )
         # without the load, under which there may be no equilibrium
-        point = case.question.point(_bare(case))
+        point = case.question.point(_device_without_load(case))
         return case.device.load_path(case["push"], case["count"], point=point, progress=case.progress)
 
     def reason(self, case: CommandLine, result: LoadPath) -> str | None:
         return result.reason
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        facts = case.question.linear_circumstances(_unpushed(case))
-        return facts | {"left_out": [*case.device.linear_omissions, *_of_push(case)]}
+        """What every answer states, of the device without the push; and what charts under a push leave out."""
+        facts = case.question.linear_circumstances(_device_without_push(case))
+        return facts | {"left_out": [*case.device.linear_omissions, *_omissions_under_push(case)]}
 
     def heading(self, case: CommandLine) -> str:
-        shown, of_push = heading(case.question, _unpushed(case)), _of_push(case)
+        """The first lines, of the device without the push, and what charts under a push leave out besides."""
+        shown, of_push = heading(case.question, _device_without_push(case)), _omissions_under_push(case)
         return "\n".join([shown, *(text for text in of_push if text not in shown)])
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
@@ -105,14 +108,14 @@ class LoadCommand(Command):
         return load_path_figure(result)
 
 
-def _bare(case: CommandLine) -> Device:
+def _device_without_load(case: CommandLine) -> Device:
     """The device without any load."""
     from zwidth.device.load import device_without_load
 
     return device_without_load(case.device)
 
 
-def _of_push(case: CommandLine) -> tuple[str, ...]:
+def _omissions_under_push(case: CommandLine) -> tuple[str, ...]:
     """What charts under a push leave out: what a load does to links that bend; () where none does."""
     from zwidth.loop.linear_omissions import load_omissions
     from zwidth.model.load import Load
@@ -120,12 +123,12 @@ def _of_push(case: CommandLine) -> tuple[str, ...]:
     return load_omissions(case.device.mechanism, Load(push=case["push"]), case.question.model)
 
 
-def _unpushed(case: CommandLine) -> Device:
+def _device_without_push(case: CommandLine) -> Device:
     """The device under its load but for the hand's push; without a load where that was all of it."""
     from zwidth.study.loaded_charts import without_push
 
     kept = without_push(case.device.load)
-    return _bare(case) if kept is None else case.device.under(kept)
+    return _device_without_load(case) if kept is None else case.device.under(kept)
 
 
 def _chart_row(step: PushedChart, free: float) -> list[str]:
@@ -150,7 +153,7 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
 
 def _balance_row(step: PushedChart) -> list[str]:
     """Cells on the forces in balance under one push, and on the motion along the surface."""
-    if step.wall_force != step.wall_force:
+    if step.wall_force != step.wall_force:  # nan: without an equilibrium
         return [typed(as_written(step.push, "N")), *[""] * 5]
     motion = step.sideways
     return [

@@ -188,6 +188,7 @@ class MapCommand(Command):
         return reason
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        """The circumstances and the plane; no direction where no measure depends on it."""
         facts = self.circumstances(case) | {key: document[key] for key in ("plane", "plane_through_m")}
         return facts if any(measure.along for measure in case["measures"]) else facts | {"direction": None}
 
@@ -205,7 +206,7 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
     from zwidth.study.workspace.extreme_direction import NAME, share_measure
 
     file, names = case["measures_file"], case["measures"]
-    option = "--measures-file"
+    option = "--measures-file"  # what is being read, for the message of an error
     try:
         user_measures = {} if file is None else load_measures(file)
         if NAME in user_measures:
@@ -223,10 +224,10 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
         required = [parse_requirement(text, user_measures) for text in case["requirements"]]
     except ValueError as error:
         raise BadInput(f"{option}: {error}") from None
-    every = {one.name: one for one in (*chosen, *shares, *(r.measure for r in required))}
-    if not every:
+    mapped = {one.name: one for one in (*chosen, *shares, *(requirement.measure for requirement in required))}
+    if not mapped:
         raise BadInput("--measure: is missing; name a measure to map (`zwidth map --help` lists the measures)")
-    return list(every.values()), required
+    return list(mapped.values()), required
 
 
 def _plane_option(name: str, value: str | None) -> str:
@@ -262,9 +263,9 @@ def map_page(
     """
     measures = document.get("measures") or {document["measure"]: document}
     yield _map_heading(dataset, device, list(measures))
-    for name, one in measures.items():
-        yield f"\n{one['title']} ({name})"
-        yield two_columns(list(_rows(dataset, name, one["overall"])))
+    for name, entry in measures.items():
+        yield f"\n{entry['title']} ({name})"
+        yield two_columns(list(_rows(dataset, name, entry["overall"])))
     if area is not None:
         yield "\nRequirements"
         yield two_columns(list(_area_rows(area)))
@@ -296,7 +297,7 @@ def _map_heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
 
 
 def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Rows on one measure over the map: average, extremes and where they lie, uniformity, cells by status.
+    """Rows (label, value) on one measure over the map: average, extremes, uniformity, cells by status.
 
     overall  numbers over all cells with a value, as the document has them
     """
@@ -305,14 +306,14 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
     values, status = dataset[name].values, dataset[f"{name}_status"].values
     unit, better = str(dataset[name].attrs.get("unit", "")), dataset[name].attrs["better"]
     if (status == OK).any():
-        yield "average", _amount(overall["average"], unit)
+        yield "average", _value_text(overall["average"], unit)
         low, high = (
             ("worst", "best") if better == "higher" else ("best", "worst") if better else ("lowest", "highest")
         )
         for label, at in ((low, np.nanargmin(values)), (high, np.nanargmax(values))):
             row, column = np.unravel_index(at, values.shape)
             where = vector((dataset["x_m"].values[column], dataset["y_m"].values[row]), "m")
-            yield label, f"{_amount(values[row, column], unit)} at {where}"
+            yield label, f"{_value_text(values[row, column], unit)} at {where}"
         yield "uniformity", f"{amount(overall['uniformity'])} (smallest over largest)"
         for key, title in (("conditioning_index", "conditioning index"), ("isotropy_index", "isotropy index")):
             if key in overall:
@@ -321,17 +322,18 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
     yield "cells", ", ".join(f"{counts[k]} {text}" for k, text in STATUS.items() if counts[k])
 
 
-def _amount(value: float, unit: str) -> str:
+def _value_text(value: float, unit: str) -> str:
+    """A value with its unit, or the word where it is infinite."""
     return "infinite" if value == inf else amount(value, unit)
 
 
 def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
-    """Rows on the area in which each requirement is met, and on that in which all are."""
+    """Rows (label, value) on the area in which each requirement is met, and on that in which all are."""
     for requirement, region in zip(area.requirements, area.regions, strict=True):
-        yield requirement.text, _area(region.area, region.share)
-    yield "common area", _area(area.common.area, area.common.share)
+        yield requirement.text, _area_text(region.area, region.share)
+    yield "common area", _area_text(area.common.area, area.common.share)
 
 
-def _area(area: float, share: float) -> str:
+def _area_text(area: float, share: float) -> str:
     """An area [m^2] in words, and its share of the reachable one."""
     return f"{typed(area_text(area))}, {typed(percent(share))} of the reachable area"

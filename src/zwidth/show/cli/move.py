@@ -67,9 +67,11 @@ def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
     """
     environment, plane, two_sided = options["environment"], options["plane"], options["two_sided"]
     if not surfaces:
-        alone = [name for name in WALL_OPTIONS if options[name] not in (None, False, ())]
-        if alone:
-            raise usage_error(f"{_option(alone[0])} needs a surface; add --plane, --sphere or --box")
+        without_surface = [name for name in WALL_OPTIONS if options[name] not in (None, False, ())]
+        if without_surface:
+            raise usage_error(
+                f"{_option_as_typed(without_surface[0])} needs a surface; add --plane, --sphere or --box"
+            )
         return
     missing = [f"--{name}" for name in ("stiffness", "damping") if options[name] is None]
     if environment is None and missing:
@@ -91,11 +93,13 @@ def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
 
 def _check_sizes(options: Mapping[str, Any]) -> None:
     """Raise click.UsageError for a push or velocity too large to be meant."""
-    for name, most, unit in (("push", STRONGEST, "N"), ("start_velocity", FASTEST, "m/s")):
+    for name, limit, unit in (("push", STRONGEST, "N"), ("start_velocity", FASTEST, "m/s")):
         value = options[name] or ()
-        if any(abs(part) > most for part in value):
+        if any(abs(part) > limit for part in value):
             numbers = ",".join(f"{part:g}" for part in value)
-            raise usage_error(f"{_option(name)}: must lie from -{most:g} to {most:g} {unit}, got {numbers}")
+            raise usage_error(
+                f"{_option_as_typed(name)}: must lie from -{limit:g} to {limit:g} {unit}, got {numbers}"
+            )
 
 
 def _check_question(options: Mapping[str, Any], question: Question) -> None:
@@ -166,7 +170,8 @@ def _with_height(numbers: Sequence[float], height: float) -> tuple[float, ...]:
     return (*numbers, height) if len(numbers) == 2 else tuple(numbers)
 
 
-def _option(name: str) -> str:
+def _option_as_typed(name: str) -> str:
+    """The option of an argument as the command line spells it."""
     return "--parameter" if name == "parameters" else as_option(name)
 
 
@@ -235,6 +240,7 @@ class MoveCommand(Command):
         check_motion(case.options, case.question)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        """What every answer states, without an operator; operator and load of the file are left out."""
         # nobody holds the handle but by the push
         left_out = [OPERATOR] if case.device.operator is not None else []
         left_out += ["the load"] if case.device.load is not None else []
@@ -302,7 +308,8 @@ def _check_memory(case: CommandLine) -> None:
     from zwidth.resources import check_memory
 
     samples = case["duration"] / case.device.controller.sampling_period
-    numbers = NUMBERS_PER_SAMPLE[0] + NUMBERS_PER_SAMPLE[1] * len(case.point.drives.names)
+    of_sample, of_drive = NUMBERS_PER_SAMPLE
+    numbers = of_sample + of_drive * len(case.point.drives.names)
     check_memory((1 + AS_TEXT) * samples * numbers, f"{samples:.4g} samples", "move for a shorter time")
 
 
@@ -317,22 +324,22 @@ def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str,
     start = vector(motion.start.position, "m")
     yield f"{printable(case.device.name)}: the whole mechanism from {start}, assembly {document['assembly']}"
     yield computer_text(case.device.controller)
-    yield _status(document)
-    yield two_columns([*_circumstances(case, motion), *_results(motion, document)])
-    yield answer_table(HEADINGS, list(_energies(document["energy_book_J"])))
+    yield _status_sentence(document)
+    yield two_columns([*_circumstance_rows(case, motion), *_result_rows(motion, document)])
+    yield answer_table(HEADINGS, list(_energy_table_rows(document["energy_book_J"])))
     yield from _remarks(case, motion, document)
 
 
-def _status(document: Mapping[str, Any]) -> str:
+def _status_sentence(document: Mapping[str, Any]) -> str:
     """Sentence on how long the motion lasted, or why it ended early."""
     if document["ended_because"] is None:
         return f"moved for {amount(document['duration_s'], 's')}"
     return f"ended early: {document['ended_because']}"
 
 
-def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
-    """Rows on what a motion was given: surface, start, push, gravity and simulated time."""
-    yield "surface", _surface(motion, named=case["environment"] is not None)
+def _circumstance_rows(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
+    """Rows (label, value) on what a motion was given: surface, start, push, gravity and simulated time."""
+    yield "surface", _surface_text(motion, named=case["environment"] is not None)
     moving = f"with {vector(motion.start_velocity, 'm/s')}" if motion.start_velocity.any() else "at rest"
     yield "start", moving
     yield "hand", f"pushes with {vector(motion.push[0], 'N')}" if motion.push.any() else "does not push"
@@ -344,7 +351,7 @@ def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
     yield "simulated", f"{length}, {motion.substeps} {steps} between them"
 
 
-def _surface(motion: MechanismMotion, named: bool) -> str:
+def _surface_text(motion: MechanismMotion, named: bool) -> str:
     """The surface and what is rendered there, in words.
 
     named  whether --environment names it; else it is a wall of stiffness and damping
@@ -371,17 +378,20 @@ def _surface(motion: MechanismMotion, named: bool) -> str:
     return f"{place}; {amount(parameters['stiffness'], 'N/m')}, {amount(parameters['damping'], 'N s/m')}{pulls}"
 
 
-def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Row]:
-    """Rows on a motion's numbers: contact, limits, where the handle ends, and how far it went."""
+def _result_rows(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Row]:
+    """Rows (label, value) on a motion's numbers: contact, limits, where the handle ends, and how far it went."""
     import numpy as np
 
     if motion.surface is not None:
-        yield "largest penetration", _when(document["largest_penetration_m"], "m", motion.penetration, motion.time)
-        yield "largest force", _when(document["largest_force_N"], "N", motion.force_size, motion.time)
+        yield (
+            "largest penetration",
+            _with_time(document["largest_penetration_m"], "m", motion.penetration, motion.time),
+        )
+        yield "largest force", _with_time(document["largest_force_N"], "N", motion.force_size, motion.time)
         yield "in contact", f"{typed(percent(document['contact_share']))} of the samples"
-        yield "torque limits", _limits(motion)
+        yield "torque limits", _torque_limit_text(motion)
         if isfinite(motion.point.controller.force_limit):
-            yield "force limit", _share(document["force_limit_share"])
+            yield "force limit", _share_text(document["force_limit_share"])
     size = float(np.max(np.abs(motion.position)))
     yield "handle at the end", vector(_without_rounding(motion.position[-1], size), "m")
     path = float(np.sum(np.linalg.norm(np.diff(motion.position, axis=0), axis=1)))
@@ -395,42 +405,45 @@ def _without_rounding(position: Any, size: float) -> Any:
     return np.where(np.abs(position) > ROUNDING_SHARE * size, position, 0.0)
 
 
-def _when(value: float, unit: str, course: Any, time: Any) -> str:
-    """A largest value with the time at which `course`, (samples,), is largest; times [s]."""
+def _with_time(value: float, unit: str, course: Any, time: Any) -> str:
+    """A largest value in words, with the time (samples,) [s] at which its `course` (samples,) is largest."""
     if not value > 0.0:
         return amount(0.0, unit)
     return f"{amount(value, unit)}, after {amount(float(time[course.argmax()]), 's')}"
 
 
-def _limits(motion: MechanismMotion) -> str:
+def _torque_limit_text(motion: MechanismMotion) -> str:
     """How often each drive with a torque limit reached it."""
     limits = motion.mechanism.drives.torque_limit
     shares = [
-        f"{printable(name)} {_share(share)}"
+        f"{printable(name)} {_share_text(share)}"
         for (name, share), limit in zip(motion.torque_limit_share.items(), limits, strict=True)
         if isfinite(limit)
     ]
     return "; ".join(shares) or "none in the file"
 
 
-def _share(share: float) -> str:
+def _share_text(share: float) -> str:
+    """How often a limit was reached, as a share of the samples."""
     return f"reached in {typed(percent(share))} of the samples" if share > 0.0 else "not reached"
 
 
-def _energies(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
-    """Rows of the energy table: what each part gave; stored in the motion and in bending drives last.
+def _energy_table_rows(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
+    """Rows of the energy table, as `energy_rows`: what each part gave; stored in motion and bending drives last.
+
+    book  `MechanismMotion.energy_book` [J]
 
     What is not known is the difference: the dampers, or, where a motor's work is not known, motors and dampers.
     """
-    own = {"hand": book["hand"], "motors": book["motors"], "gravity": book["gravity"]}
-    own["dry friction"] = book["friction"]
-    if isnan(own["motors"]):
-        known = own["hand"] + own["gravity"] + own["dry friction"]
-        own = {"motors and dampers, by difference" if name == "motors" else name: x for name, x in own.items()}
-        own["motors and dampers, by difference"] = book["stored"] - known
+    given = {"hand": book["hand"], "motors": book["motors"], "gravity": book["gravity"]}
+    given["dry friction"] = book["friction"]
+    if isnan(given["motors"]):
+        known = given["hand"] + given["gravity"] + given["dry friction"]
+        given = {"motors and dampers, by difference" if name == "motors" else name: x for name, x in given.items()}
+        given["motors and dampers, by difference"] = book["stored"] - known
     else:
-        own["dampers, by difference"] = book["dampers"]
-    return energy_rows(own, book["stored"])
+        given["dampers, by difference"] = book["dampers"]
+    return energy_rows(given, book["stored"])
 
 
 def _remarks(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[str]:
@@ -465,6 +478,7 @@ def _ineffective_push(motion: MechanismMotion) -> float:
     import numpy as np
 
     push = motion.push[0]
+    # the columns whose singular value is not 0 span the directions in which the handle moves
     along, sizes, _ = np.linalg.svd(motion.start.jacobian)
     ways = along[:, : len(sizes)][:, sizes > NO_WAY * sizes.max()]
     across = float(np.linalg.norm(push - ways @ (ways.T @ push)))

@@ -45,6 +45,8 @@ class NewCommand(Command):
     has_device = False
 
     def about(self, command: Callback) -> Callback:
+        """Give the command NAME, in a `Question` in place of a device."""
+
         @wraps(command)
         def with_name(device: str, **more: Any) -> int:
             return command(Question(device), **more)
@@ -60,21 +62,22 @@ class NewCommand(Command):
             raise BadInput(f"{case.path}: exists already; remove it, or name another file with --output")
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return {"name": _name(case.question), "kind": case["kind"]}
+        return {"name": _device_name(case.question), "kind": case["kind"]}
 
     def compute(self, case: CommandLine) -> str:
+        """The text of the device file. Raises BadInput for a name that cannot be."""
         from zwidth.device.read import new_device
 
         try:
-            return new_device(_name(case.question), case["kind"])
+            return new_device(_device_name(case.question), case["kind"])
         except ValueError as error:
             raise BadInput(str(error)) from None
 
     def document(self, case: CommandLine, result: str) -> dict[str, Any]:
-        return {}
+        return {}  # the circumstances say it all
 
     def heading(self, case: CommandLine) -> str:
-        return ""
+        return ""  # the pages begin with the kind of device
 
     def pages(self, case: CommandLine, result: str, document: Mapping[str, Any]) -> Iterator[Any]:
         file = printable(shlex.quote(document["file"]))
@@ -86,7 +89,7 @@ class NewCommand(Command):
         return reason
 
 
-def _name(question: Question) -> str:
+def _device_name(question: Question) -> str:
     """What the device is called: NAME without a folder and without the file's ending."""
     name = Path(question.name).name
     return name[: -len(ENDING)] if name.lower().endswith(ENDING) else name

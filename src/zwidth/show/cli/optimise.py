@@ -53,6 +53,7 @@ class OptimiseCommand(Command):
         return about_a_study(command, bounds=True)
 
     def check(self, case: CommandLine) -> None:
+        """Refuse options of a run that do not go together, and a folder into which no design can be written."""
         check_workers(case.options)
         if case["designs"] is not None:
             assert isinstance(case.question, StudyQuestion)
@@ -81,19 +82,19 @@ class OptimiseCommand(Command):
         return result.reason
 
     def heading(self, case: CommandLine) -> str:
-        return ""
+        return ""  # the pages begin with how the front was found
 
     def pages(self, case: CommandLine, result: Optimisation, document: Mapping[str, Any]) -> Iterator[Any]:
         """How the front was found, a row for each of its designs, and further sentences."""
         from zwidth.show.report.optimisation import optimisation_sentences
 
-        said = [printable(typed(sentence)) for sentence in optimisation_sentences(result)]
-        yield f"{printable(document['name'])}: {said[0]}"
+        sentences = [printable(typed(sentence)) for sentence in optimisation_sentences(result)]
+        yield f"{printable(document['name'])}: {sentences[0]}"
         if document["left_out"]:
             yield omission_text(document["left_out"])
         if len(result.front):
             yield answer_table(*front_table(result))
-        yield from said[1:]
+        yield from sentences[1:]
 
     def write(
         self, case: CommandLine, result: Optimisation, document: dict[str, Any], reason: str | None
@@ -175,8 +176,8 @@ def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
     headings += [f"{one.name} [{spoken_unit(one.unit)}]" if one.unit else one.name for one in problem.columns]
     rows = []
     if found.baseline is not None:
-        own = [axis_value_text(value) for value in own_values(problem)]
-        rows.append(["as it is", *own, *(typed(number(value)) for value in found.baseline.values[0].tolist())])
+        before = [axis_value_text(value) for value in own_values(problem)]
+        rows.append(["as it is", *before, *(typed(number(value)) for value in found.baseline.values[0].tolist())])
     for place in range(len(found.front)):
         design = found.design(place)
         settings = [axis_value_text(design[axis.key]) for axis in problem.variables]

@@ -112,8 +112,11 @@ class Question:
         """What a linear result states first: its circumstances, and what of the device it leaves out."""
         return self.circumstances(device) | {"left_out": list(device.omissions(self.model))}
 
-    def _where(self, device: Device) -> tuple[Floats | None, float | None]:
-        """Position of the handle [m], and how far it was projected; as typed, and None, if out of reach."""
+    def _position_and_projection(self, device: Device) -> tuple[Floats | None, float | None]:
+        """Return the handle's position (3,) and how far it was projected [m]; as typed, and None, if out of reach.
+
+        Of angles as typed that are out of reach the position is None, too.
+        """
         from zwidth.errors import LoadError, PostureError
 
         try:
@@ -129,7 +132,7 @@ class Question:
 
         mechanism = device.mechanism is not None
         of_load = load_omissions(device.mechanism, device.load, self.model)
-        position, projected = self._where(device) if mechanism else (None, None)
+        position, projected = self._position_and_projection(device) if mechanism else (None, None)
         return {
             "name": device.name,
             "device": self.name,
@@ -170,15 +173,15 @@ class Numbers(ParamType):
         """The numbers as a tuple; fails for a wrong count, or for one that is not finite."""
         if isinstance(value, tuple):
             return value
-        one = self.argument
-        whole = one.kind == "counts"
+        argument = self.argument
+        whole = argument.kind == "counts"
         try:
             numbers = tuple(int(part) if whole else float(part) for part in value.split(","))
         except ValueError:
             numbers = ()
-        if len(numbers) not in one.lengths or not all(map(math.isfinite, numbers)):
-            count, kind = " or ".join(map(str, one.lengths)), "whole" if whole else "finite"
-            self.fail(f"must be {count} {kind} numbers such as {one.example}, got {value!r}", param, ctx)
+        if len(numbers) not in argument.lengths or not all(map(math.isfinite, numbers)):
+            count, kind = " or ".join(map(str, argument.lengths)), "whole" if whole else "finite"
+            self.fail(f"must be {count} {kind} numbers such as {argument.example}, got {value!r}", param, ctx)
         return numbers
 
 
@@ -337,14 +340,14 @@ def about_a_workspace(command: Callback) -> Callback:
         extreme = direction if isinstance(direction, str) else None
         return command(replace(question, direction=None if extreme else direction), extreme=extreme, **more)
 
-    one = PLACE["direction"]
-    one = replace(
-        one,
-        sentence=f"{one.sentence}; worst: in each cell the direction in which the measure is worst",
-        value=f"{one.value}|{'|'.join(EXTREMES)}",
-        example=f"{one.example}, or one of {', '.join(EXTREMES)}",
+    argument = PLACE["direction"]
+    argument = replace(
+        argument,
+        sentence=f"{argument.sentence}; worst: in each cell the direction in which the measure is worst",
+        value=f"{argument.value}|{'|'.join(EXTREMES)}",
+        example=f"{argument.example}, or one of {', '.join(EXTREMES)}",
     )
-    return _with_device_options(with_extreme, DEVICE_NAME, option(one, DirectionType(one)))
+    return _with_device_options(with_extreme, DEVICE_NAME, option(argument, DirectionType(argument)))
 
 
 def about_every_posture(command: Callback) -> Callback:
@@ -361,10 +364,10 @@ def _with_device_options(command: Callback, device: Decorator, *where: Decorator
     @wraps(command)
     def with_arguments(device: str, **options: Any) -> int:
         """Call the command with the options of the device as a `Question`, and the others as they are."""
-        own = {name: options.pop(name) for name in (*PLACE, *DEVICE) if name in options}
+        of_device = {name: options.pop(name) for name in (*PLACE, *DEVICE) if name in options}
         if loads:
-            own |= {name: options.pop(name) for name in LOADS}
-        return command(Question(device, **own), **options)
+            of_device |= {name: options.pop(name) for name in LOADS}
+        return command(Question(device, **of_device), **options)
 
     return decorated(with_arguments, [device, *where, *(options_of(LOADS) if loads else ()), *options_of(DEVICE)])
 

@@ -39,6 +39,7 @@ class PolarCommand(Command):
     takes_responses = True  # which it refuses like every device without a mechanism
 
     def check(self, case: CommandLine) -> None:
+        """Raise BadInput for --direction: all directions of a plane are computed."""
         if case.question.direction is not None:
             raise BadInput(
                 "--direction: does not apply to all directions of a plane; leave it out, or use --plane"
@@ -67,18 +68,18 @@ class PolarCommand(Command):
     def heading(self, case: CommandLine) -> str:
         """The first lines, without a direction: device and posture; computer; what is left out."""
         facts = self.circumstances(case)
-        _, rest = super().heading(case).split("\n", 1)
+        _, further_lines = super().heading(case).split("\n", 1)
         where = f"at {vector(facts['position_m'], 'm')}, assembly {facts['assembly']}, model {facts['model']}"
         if (load := case.device.load) is not None:
             where += f", under {load_text(load.along_every_direction)}"
-        return f"{printable(case.device.name)}: {where}\n{rest}"
+        return f"{printable(case.device.name)}: {where}\n{further_lines}"
 
     def pages(self, case: CommandLine, result: ByDirection, document: Mapping[str, Any]) -> Iterator[Any]:
         yield two_columns(list(_rows(result)))
 
 
 def _rows(by_direction: ByDirection) -> Iterator[tuple[str, str]]:
-    """Rows on all directions of a plane: how many, the stiffest, the least stiff, and why some have no answer."""
+    """Rows (label, value) on all directions: how many, the stiffest, the least stiff, and those without answer."""
     import numpy as np
 
     plane, count = by_direction.plane, len(by_direction.stiffness)

@@ -41,10 +41,11 @@ def show_progress(busy: Callable[[], bool] | None = None) -> Iterator[Progress]:
 
 
 class _Bars:
-    """A bar for each stage, from the time on when the user has waited long enough."""
+    """A bar for each stage, once the user has waited long enough; `busy` as of `show_progress`."""
 
     def __init__(self, busy: Callable[[], bool] | None = None) -> None:
         self._busy = busy or (lambda: False)
+        # the stage's name, its steps done, and all its steps; 0: not known
         self._began, self._stage, self._lock = monotonic(), ("computing", 0, 0), Lock()
         self._bar: Any = None
         self._tasks: dict[str, Any] = {}
@@ -83,7 +84,7 @@ class _Bars:
 
 
 class _Lines:
-    """Lines that say how far a run is."""
+    """Lines that say how far a run is; `busy` as of `show_progress`."""
 
     def __init__(self, busy: Callable[[], bool] | None = None) -> None:
         self._busy = busy or (lambda: False)
@@ -113,14 +114,14 @@ class _Lines:
         """Nothing is left to be taken away."""
 
     def _line(self, now: float) -> str:
-        """Stage, count, and an estimate by how fast the stage has been so far."""
+        """Stage, count, and at the time `now` [s] an estimate by how fast the stage has been so far."""
         if not self._of:
             return self._stage
         line = f"{self._stage}, {self._done} of {self._of}"
-        here = self._done - self._first
-        if self._done == self._of or here <= 0 or here < AN_ESTIMATE * (self._of - self._first):
+        done_here = self._done - self._first
+        if self._done == self._of or done_here <= 0 or done_here < AN_ESTIMATE * (self._of - self._first):
             return line
-        return f"{line}, about {time_text((now - self._began) * (self._of - self._done) / here)} left"
+        return f"{line}, about {time_text((now - self._began) * (self._of - self._done) / done_here)} left"
 
 
 DONE: Final = 0

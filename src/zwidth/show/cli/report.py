@@ -26,6 +26,7 @@ class ReportCommand(Command):
         return default_name(question.name)
 
     def compute(self, case: CommandLine) -> dict[str, Any]:
+        """Write the report; the numbers in it by the keys of the answer, and `reason` where no wall is stable."""
         _ = case.point.plant  # whether it can be meant, before the heavy parts are imported
         from zwidth.show.report.report import write_report
 
@@ -37,14 +38,14 @@ class ReportCommand(Command):
         return result | self.circumstances(case)
 
     def reason(self, case: CommandLine, result: dict[str, Any]) -> str | None:
-        reason: str | None = result.pop("reason", None)
+        reason: str | None = result.pop("reason", None)  # the answer has it beside the numbers, and not twice
         return reason
 
     def write(self, case: CommandLine, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
         return reason  # written as it was computed
 
     def heading(self, case: CommandLine) -> str:
-        return ""
+        return ""  # the summary says it
 
     def pages(self, case: CommandLine, result: dict[str, Any], document: Mapping[str, Any]) -> Iterator[Any]:
         yield from (typed(sentence) for sentence in result["summary"])

@@ -63,8 +63,9 @@ def _default_folder(beside: Path | None) -> Path:
 
 @contextmanager
 def report_kept_work(store: Store | None) -> Iterator[None]:
-    """Run inside this block; says where the work is if it is stopped.
+    """Turn errors of a long run inside this block into messages that say where the finished work is kept.
 
+    store   that keeps it; None: nothing is kept
     Raises  UnfinishedRun  where no process computes, or a cluster has ended
             BadInput       where the disk refuses, another run computes here, or a cluster does not answer
     """
@@ -76,8 +77,9 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
 
 @contextmanager
 def series_of(case: CommandLine) -> Iterator[JobSeries]:
-    """Computes the jobs of a command that asks several, one after another, as its options say; what is done is
-    kept in a folder of the user's, or beside the file that is written.
+    """The series that computes a command's jobs one after another inside this block, as its options say.
+
+    What is done is kept in a folder of the user's, or beside the file that is written.
 
     Raises  as `report_kept_work`
     """
@@ -112,7 +114,7 @@ def remove_series(case: CommandLine) -> None:
 
 @contextmanager
 def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Iterator[None]:
-    """Run inside this block, as `report_kept_work`.
+    """As `report_kept_work`, for work that is kept in a folder.
 
     folder  that keeps the finished work; None: none does;   begun  says whether there is any in it
     """

@@ -119,7 +119,11 @@ class RobustCommand(Command):
         shares = result.edge_shares
         paths = list(result.members[0])
         rows = [
-            [str(index), *(printable(value_text(result.members[index][p])) for p in paths), _share(share)]
+            [
+                str(index),
+                *(printable(value_text(result.members[index][path])) for path in paths),
+                _share_text(share),
+            ]
             for index, share in list(shares.items())[:BINDING_ROWS]
         ]
         yield answer_table(["limiting member", *paths, "share of the edge"], rows)
@@ -138,7 +142,7 @@ def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
         logarithmic = len(parts) == 3 and parts[2] == "log"
         try:
             low, high = map(float, parts[:2] if logarithmic else parts)
-        except ValueError:
+        except ValueError:  # no numbers, or not two of them
             equals = ""
         if not equals or not path:
             lines.append(f"--range: must be PATH=LOW,HIGH or PATH=LOW,HIGH,log with two numbers, got {text!r}")
@@ -175,17 +179,17 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
 
 
 def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
-    """Rows on a family: walls stable for all, what is lost against the best member, and the members."""
+    """Rows (label, value) on a family: walls stable for all, the loss against the best member, the members."""
     chart = study.chart
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
-    members = " and ".join(_member(study, member) for member in chart.members_at_stiffness_max)
+    members = " and ".join(_member_name(study, member) for member in chart.members_at_stiffness_max)
     of_whom = " (charted members)" if not study.holds_for_all else " (in doubt)" if study.doubt else ""
     yield (
         f"largest stiffness{of_whom}",
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'N s/m')} of damping; "
         f"at this limit {members} oscillates at {frequencies}",
     )
-    stiffest, widest = _member(study, chart.best_by_stiffness), _member(study, chart.best_by_area)
+    stiffest, widest = _member_name(study, chart.best_by_stiffness), _member_name(study, chart.best_by_area)
     yield (
         "loss against the best",
         (
@@ -211,7 +215,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
         yield "not affected by a wall", ", ".join(listed_names(chart.unobserved_modes))
 
 
-def _member(study: RobustStudy, member: int) -> str:
+def _member_name(study: RobustStudy, member: int) -> str:
     """A member by its operator, where members differ in nothing else; otherwise by its number."""
     from zwidth.device.load import NOBODY
     from zwidth.study.robust.family import MEAN
@@ -225,7 +229,7 @@ def _member(study: RobustStudy, member: int) -> str:
     return "the ungripped device" if operator == NOBODY else f"the device held by {operator_text(str(operator))}"
 
 
-def _share(share: float) -> str:
+def _share_text(share: float) -> str:
     """A share of the edge in per cent; very small ones are only bounded."""
     return "under 0.01 %" if 0.0 < share < LEAST_SHARE else typed(percent(share))
 

@@ -63,6 +63,7 @@ class SensitivityCommand(Command):
     may_be_undecided = True
 
     def compute(self, case: CommandLine) -> Found:
+        """The sensitivities, and with --goal the numbers that would reach it."""
         found = case.device.sensitivities(case.point, case.progress)
         if case["goal"] is None:
             return Found(found, None)
@@ -81,18 +82,18 @@ class SensitivityCommand(Command):
         return None if result.sensitivities.peak is not None else NO_WALL
 
     def pages(self, case: CommandLine, result: Found, document: Mapping[str, Any]) -> Iterator[Any]:
-        yield from self._sensitivities(case, result.sensitivities)
+        yield from self._sensitivity_pages(case, result.sensitivities)
         if result.goal is not None:
             yield from _goal_pages(result.goal, case["top"])
 
-    def _sensitivities(self, case: CommandLine, result: Sensitivities) -> Iterator[Any]:
+    def _sensitivity_pages(self, case: CommandLine, result: Sensitivities) -> Iterator[Any]:
         """Pages on the stiffest wall, and on the numbers that change it most; nothing without such a wall."""
         peak = result.peak
         if peak is None:
             return
         stiffest = f"{amount(peak.stiffness, 'N/m')} at {amount(peak.damping, 'N s/m')} of damping"
         yield f"largest stiffness {stiffest}{PLACES[result.kind]}"
-        known = [number for number in result.numbers if number.logarithmic == number.logarithmic]
+        known = [number for number in result.numbers if number.logarithmic == number.logarithmic]  # not nan
         shown = [number for number in known if number.logarithmic != 0.0][: case["top"]]
         yield answer_table(
             ["number", "value", "sensitivity", "+1 % gives"], [_row(result, number) for number in shown]
@@ -120,34 +121,47 @@ def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
     shown = goal.reached[:top]
     if shown:
         yield f"for a largest stiffness of {wanted} one of these numbers would have to be"
-        yield answer_table(["number", "value", "would have to be", "factor"], [_goal_row(one) for one in shown])
+        yield answer_table(
+            ["number", "value", "would have to be", "factor"], [_goal_row(goal_number) for goal_number in shown]
+        )
     else:
         yield f"no number alone gives a largest stiffness of {wanted}"
-    more = len(goal.reached) - len(shown)
-    if more > 0:
-        yield f"{more} more; show them with --top N, or get all with --json or --output"
-    near = next((one for one in goal.numbers if one.status == "out of range"), None)
+    unshown = len(goal.reached) - len(shown)
+    if unshown > 0:
+        yield f"{unshown} more; show them with --top N, or get all with --json or --output"
+    near = next((goal_number for goal_number in goal.numbers if goal_number.status == "out of range"), None)
     if near is not None and near.value != near.now:
         value = f"{typed(number(near.value))} {unit_text(near.unit)}".rstrip()
         reached = amount(near.stiffness_max, "N/m")
         yield f"of the others {near.path} comes nearest, {reached} with {value}"
 
 
-def _goal_row(one: GoalNumber) -> tuple[str, str, str, str]:
-    """Cells of a number that reaches the goal: path, value now, value that it would need, ratio of the two."""
-    unit = unit_text(one.unit)
-    now, wanted = f"{typed(as_written(one.now))} {unit}".rstrip(), f"{typed(number(one.value))} {unit}".rstrip()
-    return one.path, now, wanted, amount(one.factor) if one.factor == one.factor else ""
+def _goal_row(goal_number: GoalNumber) -> tuple[str, str, str, str]:
+    """Cells of a number that reaches the goal: path, value now, value that it would need, ratio of the two.
+
+    The ratio is "" where it is nan, as of a number that is 0 now
+    """
+    unit = unit_text(goal_number.unit)
+    now, wanted = (
+        f"{typed(as_written(goal_number.now))} {unit}".rstrip(),
+        f"{typed(number(goal_number.value))} {unit}".rstrip(),
+    )
+    return (
+        goal_number.path,
+        now,
+        wanted,
+        amount(goal_number.factor) if goal_number.factor == goal_number.factor else "",
+    )
 
 
-def _row(sensitivities: Sensitivities, one: Sensitivity) -> tuple[str, str, str, str]:
+def _row(sensitivities: Sensitivities, sensitivity: Sensitivity) -> tuple[str, str, str, str]:
     """Cells of a number: path, value, logarithmic sensitivity, and the stiffness gained by 1 % more of it."""
     assert sensitivities.peak is not None
-    gain = 0.01 * one.logarithmic * sensitivities.peak.stiffness
+    gain = 0.01 * sensitivity.logarithmic * sensitivities.peak.stiffness
     return (
-        one.path,
-        f"{typed(as_written(one.value))} {unit_text(one.unit)}".rstrip(),
-        typed(signed(one.logarithmic)),
+        sensitivity.path,
+        f"{typed(as_written(sensitivity.value))} {unit_text(sensitivity.unit)}".rstrip(),
+        typed(signed(sensitivity.logarithmic)),
         f"{'+' if gain > 0.0 else ''}{amount(gain, 'N/m')}",
     )
 

@@ -55,11 +55,15 @@ class ShowCommand(Command):
         from zwidth.device.plausibility import unknown_numbers
 
         unknown = unknown_numbers(case.device.document)
-        missing = [{"path": path, "needed_for": one.needed_for} for one in unknown for path in one.paths]
-        own = result.document() | {"missing": missing, "sources": case.device.sources}
+        missing = [
+            {"path": path, "needed_for": missing_group.needed_for}
+            for missing_group in unknown
+            for path in missing_group.paths
+        ]
+        numbers = result.document() | {"missing": missing, "sources": case.device.sources}
         if case.device.load is not None:
-            own["equilibrium"] = case.point.equilibrium.document(case.point.drives.names)
-        return own
+            numbers["equilibrium"] = case.point.equilibrium.document(case.point.drives.names)
+        return numbers
 
     def table(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
         from zwidth.measures.description import entries
@@ -70,7 +74,7 @@ class ShowCommand(Command):
         """Masses and frequencies, the balance under load, the mechanism, missing numbers, and sources."""
         values = json_value(document)
         if result.effective is not None:
-            yield two_columns(_felt(values))
+            yield two_columns(_felt_rows(values))
         if case.device.load is not None:
             from zwidth.show.load_text import balance_rows, drive_rows
 
@@ -78,7 +82,7 @@ class ShowCommand(Command):
         if case.device.mechanism is not None:
             with speaking_of_moments(False):  # the mechanism's own lengths are none of the rendered axis
                 yield from _mechanism_pages(case.device.mechanism, result, values)
-        yield from _missing(case.device)
+        yield from _missing_numbers_tables(case.device)
         if values["sources"]:
             yield answer_table(["numbers", "source"], list(values["sources"].items()))
 
@@ -88,11 +92,11 @@ def _mechanism_pages(mechanism: Mechanism, result: Description, values: Mapping[
 
     values  the document as JSON has it
     """
-    units = _dexterity_units(mechanism, result)
-    dynamic = ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1]))
+    unit, dynamic_unit = _dexterity_units(mechanism, result)
+    dynamic = ("dynamic manipulability", amount(values["dynamic_manipulability"], dynamic_unit))
     yield two_columns(
         [
-            ("manipulability", amount(values["manipulability"], units[0])),
+            ("manipulability", amount(values["manipulability"], unit)),
             *([dynamic] if result.effective is not None else []),
             ("isotropy (1 is best)", amount(values["isotropy"])),
         ]
@@ -112,14 +116,14 @@ def _beam_table(beams: Sequence[BeamDescription]) -> Any:
     return answer_table(["beam", "modelled by", "mass", "carries", "first alone, clamped"], rows)
 
 
-def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Rows on masses and stiffness felt along the direction, and on natural frequencies."""
+def _felt_rows(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Rows (label, value) on masses and stiffness felt along the direction, and on natural frequencies."""
     return [
         ("link side", amount(values["link_side_mass_kg"], "kg")),
         ("motor side", amount(values["motor_side_mass_kg"], "kg")),
         ("both, rigid", amount(values["rigid_mass_kg"], "kg")),
         ("stiffness between", amount(values["stiffness_N_per_m"], "N/m")),
-        ("natural frequencies", ", ".join(_modes(values))),
+        ("natural frequencies", ", ".join(_mode_texts(values))),
     ]
 
 
@@ -134,26 +138,35 @@ def _joint_table(mechanism: Mechanism, joints: Mapping[str, Any]) -> Any:
     slides = any("m" in of_joint for of_joint in units.values())
     rows = []
     for name, value in joints.items():
-        numbers = [0.0 if abs(one) < SMALLEST else one for one in (value if isinstance(value, list) else [value])]
+        numbers = [
+            0.0 if abs(coordinate) < SMALLEST else coordinate
+            for coordinate in (value if isinstance(value, list) else [value])
+        ]
         shown = [
-            amount(one, unit) if slides else amount(one) for one, unit in zip(numbers, units[name], strict=True)
+            amount(coordinate, unit) if slides else amount(coordinate)
+            for coordinate, unit in zip(numbers, units[name], strict=True)
         ]
         rows.append((name, ", ".join(shown)))
     return answer_table(["joint", "coordinate" if slides else "angle [rad]"], rows)
 
 
-def _missing(device: Device) -> Iterator[Any]:
-    """Table of the numbers that the file leaves out, and of the answers that need them."""
+def _missing_numbers_tables(device: Device) -> Iterator[Any]:
+    """Table of the numbers that the file leaves out, and of the answers that need them; nothing if it has all."""
     from zwidth.device.plausibility import unknown_numbers
 
     unknown = unknown_numbers(device.document)
     if unknown:
-        yield answer_table(["missing", "of", ""], [(one.group, one.names, one.needed_for) for one in unknown])
+        yield answer_table(
+            ["missing", "of", ""], [(group.group, group.names, group.needed_for) for group in unknown]
+        )
 
 
 def _dexterity_units(mechanism: Mechanism, result: Description) -> tuple[str, str]:
-    """Units of both manipulabilities, products of as many singular values as there are directions to move in, or
-    to turn about where the drives control the orientation alone."""
+    """Units of manipulability and of dynamic manipulability.
+
+    They are products of as many singular values as there are directions to move in, or to turn about where the
+    drives control the orientation alone.
+    """
     import numpy as np
 
     from zwidth.measures.dexterity import ZERO_ROW
@@ -163,20 +176,20 @@ def _dexterity_units(mechanism: Mechanism, result: Description) -> tuple[str, st
     jacobian = result.angular_jacobian if turns else result.jacobian
     assert jacobian is not None
     rows = np.max(np.abs(jacobian), axis=1)
-    r = min(jacobian.shape[1], int(np.sum(rows > ZERO_ROW * np.max(rows))))
-    power = {2: "²", 3: "³"}.get(r, "")
+    directions = min(jacobian.shape[1], int(np.sum(rows > ZERO_ROW * np.max(rows))))
+    power = {2: "²", 3: "³"}.get(directions, "")
     return ("", f"1/(kg m²){power}") if turns else (f"m{power}", f"1/(kg m){power}")
 
 
-def _modes(document: Mapping[str, Any]) -> Iterator[str]:
+def _mode_texts(document: Mapping[str, Any]) -> Iterator[str]:
     """Each natural frequency with its damping; of many, as links that bend have, the highest of the rest alone."""
     frequencies = document["natural_frequencies_Hz"]
     ratios = document["damping_ratios"] or [None] * len(frequencies)
-    rest = frequencies[MODES_SHOWN:] if len(frequencies) > MODES_SHOWN + 2 else []
-    for frequency, ratio in zip(frequencies[: len(frequencies) - len(rest)], ratios, strict=False):
+    unshown = frequencies[MODES_SHOWN:] if len(frequencies) > MODES_SHOWN + 2 else []
+    for frequency, ratio in zip(frequencies[: len(frequencies) - len(unshown)], ratios, strict=False):
         if frequency is None:
             yield "unstable"
         else:
             yield amount(frequency, "Hz") + (f" ({typed(percent(ratio))})" if ratio is not None else "")
-    if rest:
-        yield f"{len(rest)} more up to {amount(rest[-1], 'Hz')}"
+    if unshown:
+        yield f"{len(unshown)} more up to {amount(unshown[-1], 'Hz')}"

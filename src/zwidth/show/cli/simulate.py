@@ -192,46 +192,46 @@ ENERGY_ERROR: Final = 1e-6  # of the largest energy, above which the imbalance i
 def simulation_page(simulation: ContactSimulation, sound: Mapping[str, Any] | None) -> Iterator[Any]:
     """The verdict, the circumstances, the numbers, the energies, what is worth a remark, and a sound if one was
     written."""
-    yield _verdict(simulation)
-    yield two_columns([*_circumstances(simulation), *_results(simulation)])
+    yield _verdict_sentence(simulation)
+    yield two_columns([*_circumstance_rows(simulation), *_result_rows(simulation)])
     yield answer_table(HEADINGS, list(energy_rows(simulation.ledger, float(simulation.energy[-1]))))
     yield from _remarks(simulation)
     if sound is not None:
-        yield from _sound(sound)
+        yield from _sound_sentences(sound)
 
 
-def _verdict(simulation: ContactSimulation) -> str:
+def _verdict_sentence(simulation: ContactSimulation) -> str:
     """The verdict on a contact, in words."""
     if simulation.behaviour == "undecided" and simulation.range_exit is not None:
         return "undecided: the motion leaves the range of the handle before the run decides"
     return BEHAVIOUR_VERDICTS[simulation.behaviour]
 
 
-def _circumstances(simulation: ContactSimulation) -> Iterator[Row]:
-    """Rows on what a contact was given: environment, start, hand and simulated time."""
+def _circumstance_rows(simulation: ContactSimulation) -> Iterator[Row]:
+    """Rows (label, value) on what a contact was given: environment, start, hand and simulated time."""
     place = f", at {amount(simulation.wall_position, 'm')}" if simulation.wall_position else ""
     yield "environment", f"{environment_words(simulation.environment, simulation.parameters)}{place}"
-    yield "start", _start(simulation)
-    yield "hand", _hand(simulation.hand)
+    yield "start", _start_text(simulation)
+    yield "hand", _hand_text(simulation.hand)
     why = f" ({simulation.length.reason})"
     yield "simulated", f"{amount(float(simulation.time[-1]), 's')}, {len(simulation.time)} samples{why}"
 
 
 def environment_words(environment: Environment, values: Mapping[str, float]) -> str:
     """An environment and its parameters: "slot: width 5 mm, stiffness 1 kN/m, damping 0 N s/m"."""
-    units = {p.name: p.unit for p in environment.parameters if not p.switch}
-    texts = [f"{name.replace('_', ' ')} {_number(values[name], unit)}" for name, unit in units.items()]
+    units = {parameter.name: parameter.unit for parameter in environment.parameters if not parameter.switch}
+    texts = [f"{name.replace('_', ' ')} {_parameter_text(values[name], unit)}" for name, unit in units.items()]
     texts += [name.replace("_", " ") for name, on in values.items() if name not in units and on]
     name = "two-sided wall" if environment.name == "wall" else environment.name
     return f"{name}: {', '.join(texts)}" if texts else name
 
 
-def _number(value: float, unit: str) -> str:
-    """A parameter with its unit; inf is one, too."""
+def _parameter_text(value: float, unit: str) -> str:
+    """A parameter with its unit; "inf" for an infinite one, which an environment may take."""
     return amount(value, unit) if isfinite(value) else "inf"
 
 
-def _start(simulation: ContactSimulation) -> str:
+def _start_text(simulation: ContactSimulation) -> str:
     """Where the device starts, from the surface, and how fast, in words."""
     depth = simulation.start_position - simulation.wall_position
     where = f"{amount(abs(depth), 'm')} {'inside' if depth > 0.0 else 'outside'}" if depth else "at its position"
@@ -243,7 +243,7 @@ def _start(simulation: ContactSimulation) -> str:
     return f"{where}, {moving}{path}"
 
 
-def _hand(hand: Hand) -> str:
+def _hand_text(hand: Hand) -> str:
     """What the hand does, in words."""
     texts = []
     if hand.push:
@@ -260,13 +260,13 @@ def _hand(hand: Hand) -> str:
     return ", ".join(texts) or "does not push"
 
 
-def _results(simulation: ContactSimulation) -> Iterator[Row]:
-    """Rows on a contact's numbers: amplitude, frequency, growth, contact, limit, passivity controller."""
+def _result_rows(simulation: ContactSimulation) -> Iterator[Row]:
+    """Rows (label, value) on a contact: amplitude, frequency, growth, share of contact, limit, controller."""
     yield "amplitude at the end", amount(simulation.amplitude, "m")
     if isfinite(simulation.dominant_frequency):
         yield "dominant frequency", amount(simulation.dominant_frequency, "Hz")
-    none = "too fast to determine" if simulation.given_up else "no motion is left"
-    growth = f"{typed(signed(simulation.growth))} per sample" if isfinite(simulation.growth) else none
+    no_growth = "too fast to determine" if simulation.given_up else "no motion is left"
+    growth = f"{typed(signed(simulation.growth))} per sample" if isfinite(simulation.growth) else no_growth
     if simulation.predicted_growth is not None:
         left = simulation.loop.plant.nonlinear.kinds
         linear = " of the linear loop" if left or isfinite(simulation.force_limit) else ""
@@ -289,7 +289,7 @@ def _remarks(simulation: ContactSimulation) -> Iterator[str]:
 
     if simulation.environment.surface and simulation.starts_inside:
         yield "starts inside the wall"
-    if not np.ptp(simulation.handle) > 0.0 and _rubs(simulation):
+    if not np.ptp(simulation.handle) > 0.0 and _pushed_against_friction(simulation):
         largest = amount(float(np.max(np.abs(simulation.force))), "N")
         yield f"dry friction holds it: the wall's force, {largest}, and the hand's do not overcome it"
     elif not np.ptp(simulation.handle) > 0.0:
@@ -315,15 +315,15 @@ def _remarks(simulation: ContactSimulation) -> Iterator[str]:
         yield f"the energies do not add up: the error is {missing} % of the largest"
 
 
-def _rubs(simulation: ContactSimulation) -> bool:
-    """Whether dry friction acts against the force."""
+def _pushed_against_friction(simulation: ContactSimulation) -> bool:
+    """Whether the wall or the hand pushes, and the device has dry friction that acts against it."""
     import numpy as np
 
     pushed = bool(np.any(simulation.force != 0.0)) or simulation.hand.push != 0.0
     return pushed and "dry friction" in simulation.loop.plant.nonlinear.kinds
 
 
-def _sound(sound: Mapping[str, Any]) -> Iterator[str]:
+def _sound_sentences(sound: Mapping[str, Any]) -> Iterator[str]:
     """How long, how fast and how loud the sound is; and a pitch at which a loudspeaker renders more of it."""
     speed, frequency = sound["speed"], sound["frequency_Hz"]
     text = f"sound: {amount(sound['seconds'], 's')}"

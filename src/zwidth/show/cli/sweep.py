@@ -124,6 +124,7 @@ class SweepCommand(Command):
         return about_a_study(command)
 
     def run(self, question: Question, as_json: bool, output: str | None = None, **options: Any) -> int:
+        """Carry out one command line; `compute` sees by the option `printed` whether --json lists all designs."""
         return super().run(question, as_json, output, printed=as_json, **options)
 
     def check(self, case: CommandLine) -> None:
@@ -191,16 +192,17 @@ class SweepCommand(Command):
         if result.study.document.get("tolerance"):
             yield "[[tolerance]] is not used: `zwidth tolerance` draws devices within it"
         if count <= LISTED:
-            headings = [*(axis.key for axis in sampling.axes), *map(_heading, columns)]
+            headings = [*(axis.key for axis in sampling.axes), *map(_column_heading, columns)]
             designs = [
-                [axis_value_text(v) for v in sampling.values(n)] + _design_texts(result, n) for n in range(count)
+                [axis_value_text(value) for value in sampling.values(n)] + _design_texts(result, n)
+                for n in range(count)
             ]
             yield answer_table(headings, designs)
         else:
             for n, one in enumerate(columns):
                 yield f"\n{one.title} ({one.name})"
-                yield two_columns(list(_extremes(result, n)))
-        yield from _reasons(result)
+                yield two_columns(list(_extreme_rows(result, n)))
+        yield from _reason_sentences(result)
 
     def write(self, case: CommandLine, result: Sweep, document: dict[str, Any], reason: str | None) -> str | None:
         """Write a folder, arrays or a table piece by piece, else as every command does; then remove the store."""
@@ -241,21 +243,27 @@ def _lists_all(case: CommandLine) -> bool:
     return case.path is not None and not case.writes([".csv", *FOLDERS])
 
 
-def _heading(one: Column) -> str:
+def _column_heading(column: Column) -> str:
     """Heading of a measure's column: its name and unit."""
-    return f"{one.name} [{spoken_unit(one.unit)}]" if one.unit else one.name
+    return f"{column.name} [{spoken_unit(column.unit)}]" if column.unit else column.name
 
 
 def _design_texts(sweep: Sweep, design: int) -> list[str]:
-    """A design's values, or what became of them."""
+    """Cells of one design: the value of each measure, or in words its status where it has none."""
     from zwidth.measures.definition import OK, STATUS
 
     values, status = sweep.cells.values[design], sweep.cells.status[design]
-    return [typed(number(float(v))) if s == OK else STATUS[int(s)] for v, s in zip(values, status, strict=True)]
+    return [
+        typed(number(float(value))) if kind == OK else STATUS[int(kind)]
+        for value, kind in zip(values, status, strict=True)
+    ]
 
 
-def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
-    """Rows on one measure: its extremes with their designs, and how many designs there are of each status."""
+def _extreme_rows(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
+    """Rows (label, value) on one measure: its extremes with their designs, and the number of designs by status.
+
+    column  number of the measure among the study's columns
+    """
     from zwidth.measures.definition import STATUS
     from zwidth.show.units import quantity
     from zwidth.study.designs.sweep import axis_value_text
@@ -265,14 +273,14 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
         if extreme is not None:
             value, design = extreme
             where = ", ".join(
-                f"{axis.key} = {axis_value_text(v)}"
-                for axis, v in zip(sampling.axes, sampling.values(design), strict=True)
+                f"{axis.key} = {axis_value_text(setting)}"
+                for axis, setting in zip(sampling.axes, sampling.values(design), strict=True)
             )
             yield name, f"{typed(quantity(value, one.unit))} at {where}"
     yield "designs", ", ".join(f"{n} {STATUS[kind]}" for kind, n in summary.by_status)
 
 
-def _reasons(sweep: Sweep) -> Iterator[str]:
+def _reason_sentences(sweep: Sweep) -> Iterator[str]:
     """Why designs have no value, once for all columns that say the same."""
     from zwidth.study.designs.sweep import note_sentences
 

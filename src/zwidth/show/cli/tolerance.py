@@ -58,7 +58,7 @@ class ToleranceFile(Question):
     seed: int | None = None
 
     @cached_property
-    def asked(self) -> ToleranceQuestion:
+    def tolerance_question(self) -> ToleranceQuestion:
         """The question, read and checked. Raises DeviceError, BadInput."""
         from zwidth.errors import TooLarge
         from zwidth.study.tolerances.question import read_question
@@ -69,14 +69,14 @@ class ToleranceFile(Question):
             raise BadInput(f"{self.name}: {error}") from None
 
     @cached_property
-    def aside(self) -> list[str]:
-        """Tables of the file that are for other commands."""
+    def unused_tables(self) -> list[str]:
+        """Names of the file's tables that are for other commands."""
         tables = {"axis": "[[axis]]", "optimise": "[optimise]"}
-        return [shown for key, shown in tables.items() if key in self.asked.aside]
+        return [shown for key, shown in tables.items() if key in self.tolerance_question.aside]
 
     def device(self) -> Device:
         """The device in the middle of its tolerances. Raises what reading the study does."""
-        return self.asked.study.device
+        return self.tolerance_question.study.device
 
 
 class ToleranceCommand(Command):
@@ -100,6 +100,8 @@ class ToleranceCommand(Command):
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .nc .mat: drawn devices, .json: all)."
 
     def about(self, command: Callback) -> Callback:
+        """Give the command STUDY.toml, as a `ToleranceFile`."""
+
         @wraps(command)
         def with_study(study: str, samples: int | None, seed: int | None, **more: Any) -> int:
             """Call the command with a `ToleranceFile`."""
@@ -109,7 +111,7 @@ class ToleranceCommand(Command):
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         assert isinstance(case.question, ToleranceFile)
-        return circumstances_of_study(case, case.question.asked.study)
+        return circumstances_of_study(case, case.question.tolerance_question.study)
 
     def check(self, case: CommandLine) -> None:
         check_workers(case.options)
@@ -123,7 +125,7 @@ class ToleranceCommand(Command):
         assert isinstance(question, ToleranceFile)
         try:
             with series_of(case) as series:
-                return answer(question.asked, series.compute)
+                return answer(question.tolerance_question, series.compute)
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:
@@ -142,9 +144,9 @@ class ToleranceCommand(Command):
         yield f"{printable(document['name'])}: {devices}, seed {question.seed}"
         if document["left_out"]:
             yield omission_text(document["left_out"])
-        asked = case.question
-        if isinstance(asked, ToleranceFile) and asked.aside:
-            yield f"{' and '.join(asked.aside)} is not used: the devices are those of the device file"
+        file = case.question
+        if isinstance(file, ToleranceFile) and file.unused_tables:
+            yield f"{' and '.join(file.unused_tables)} is not used: the devices are those of the device file"
         rows = [
             [one.key, tolerance_text(one), ", ".join(tie.key for tie in one.ties)] for one in question.tolerances
         ]
@@ -185,8 +187,8 @@ class ToleranceCommand(Command):
         from zwidth.show.figures.caption import facts_of_study
 
         assert isinstance(case.question, ToleranceFile)
-        asked = case.question.asked
-        return facts_of_study(asked.study) | {"varied": [one.key for one in asked.tolerances]}
+        question = case.question.tolerance_question
+        return facts_of_study(question.study) | {"varied": [one.key for one in question.tolerances]}
 
     def draw(self, case: CommandLine, result: ToleranceStudy) -> Figure:
         from zwidth.show.figures.tolerance import tolerance_figure
@@ -202,23 +204,23 @@ def _quantile_tables(result: ToleranceStudy) -> Iterator[Any]:
         yield answer_table(["less than this have", *shares], rows)
 
 
-def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:
+def _quantile_row(measure: MeasureQuantiles, drawn: int) -> list[str]:
     """Cells on one measure: its name, and each quantile with its interval.
 
     drawn  number of devices drawn
     """
     texts = []
-    for each in one.quantiles:
-        interval = each.interval
-        unit = spoken_unit(one.unit)
+    for quantile in measure.quantiles:
+        interval = quantile.interval
+        unit = spoken_unit(measure.unit)
         if interval.low == interval.high:
             texts.append(amount(interval.value, unit))
             continue
         texts.append(
             f"{amount(interval.value, unit)} ({amount(interval.low, unit)} to {amount(interval.high, unit)})"
         )
-    partly = "" if one.devices == drawn else f" (of {one.devices} devices with a value)"
-    return [f"{one.name}{partly}", *texts]
+    partly = "" if measure.devices == drawn else f" (of {measure.devices} devices with a value)"
+    return [f"{measure.name}{partly}", *texts]
 
 
 UNDECIDED: Final = "undecided"  # an outcome
@@ -238,36 +240,36 @@ def share_text(share: Interval) -> str:
     return typed(f"{percent(share.value)} ({low} to {high} %)")
 
 
-def tolerance_text(one: Tolerance) -> str:
+def tolerance_text(tolerance: Tolerance) -> str:
     """How a number differs, in words: normal about 0.1 kg, standard deviation 0.005 kg."""
-    law = one.distribution
+    law = tolerance.distribution
     if law.kind in ("uniform", "triangular"):
-        ends = f"{_written(law.low)} to {_written(law.high)}"
-        return f"{law.kind}, {ends}{f' {unit_text(one.unit)}' if one.unit else ''}"
-    unit = f" {unit_text(one.unit)}" if one.unit else ""
-    width = f"standard deviation {_written(law.spread)}{unit}"
+        ends = f"{_number_text(law.low)} to {_number_text(law.high)}"
+        return f"{law.kind}, {ends}{f' {unit_text(tolerance.unit)}' if tolerance.unit else ''}"
+    unit = f" {unit_text(tolerance.unit)}" if tolerance.unit else ""
+    width = f"standard deviation {_number_text(law.spread)}{unit}"
     if law.kind == "lognormal":
-        width = f"standard deviation {_written(100.0 * law.spread)} % of it"
-    ends = f"cut off below {_written(law.low)} and above {_written(law.high)}"
-    return f"{law.kind} about {_written(law.middle)}{unit}, {width}, {ends} ({_written(100.0 * law.cut_off)} %)"
+        width = f"standard deviation {_number_text(100.0 * law.spread)} % of it"
+    ends = f"cut off below {_number_text(law.low)} and above {_number_text(law.high)}"
+    cut = f"{_number_text(100.0 * law.cut_off)} %"
+    return f"{law.kind} about {_number_text(law.middle)}{unit}, {width}, {ends} ({cut})"
 
 
-def _written(value: float) -> str:
+def _number_text(value: float) -> str:
     """A number of a distribution, in four digits."""
     return f"{value:.4g}"
 
 
 def cut_sentences(tolerances: Sequence[Tolerance]) -> Iterator[str]:
     """Which distributions lose so much by being cut off that what is drawn differs from what was given."""
-    for one in tolerances:
-        law = one.distribution
+    for tolerance in tolerances:
+        law = tolerance.distribution
         if law.cut_off > MUCH_CUT:
             mean, deviation = law.moments
-            unit = f" {unit_text(one.unit)}" if one.unit else ""
-            yield (
-                f"{one.key}: {typed(percent(law.cut_off))} of its distribution is cut off; what is drawn has a "
-                f"mean of {mean:.3g}{unit} and a standard deviation of {deviation:.3g}{unit}"
-            )
+            unit = f" {unit_text(tolerance.unit)}" if tolerance.unit else ""
+            cut = f"{tolerance.key}: {typed(percent(law.cut_off))} of its distribution is cut off"
+            drawn = f"a mean of {mean:.3g}{unit} and a standard deviation of {deviation:.3g}{unit}"
+            yield f"{cut}; what is drawn has {drawn}"
 
 
 def wall_sentence(result: ToleranceStudy) -> str:
@@ -327,15 +329,15 @@ def outcome_sentences(result: ToleranceStudy) -> Iterator[str]:
 
 
 def band_rows(result: ToleranceStudy) -> Iterator[list[str]]:
-    """Of each band its share, the stiffest wall and a more cautious one, with the further devices that have it."""
+    """Rows of cells: of each band its share, the stiffest wall and a more cautious one, as `_wall_with_share`."""
     for band in result.bands:
-        walls = [_tried(band.stiffest)]
+        walls = [_wall_with_share(band.stiffest)]
         # nobody promises what most devices do not render
-        walls.append(_tried(band.certain) if band.probability >= 0.5 else "")
+        walls.append(_wall_with_share(band.certain) if band.probability >= 0.5 else "")
         yield [typed(percent(band.probability)), *walls]
 
 
-def _tried(wall: BandWall | None) -> str:
+def _wall_with_share(wall: BandWall | None) -> str:
     """A wall, and the share of further devices, drawn after it was found, in which it is stable; None: "none"."""
     if wall is None:
         return "none"
@@ -344,34 +346,38 @@ def _tried(wall: BandWall | None) -> str:
 
 
 def index_rows(outcomes: Sequence[Indices]) -> Iterator[list[str]]:
-    """Of each tolerance its part in the spread of each outcome: the total index with its interval.
+    """Rows of cells: of each tolerance its key, and its part in the spread of each outcome, as a total index.
 
-    outcomes  those that have indices
+    outcomes  those that have indices, all of the same tolerances
     """
-    for each in zip(*(one.indices for one in outcomes), strict=True):
-        yield [each[0].key, *map(_part, each)]
+    for indices in zip(*(one.indices for one in outcomes), strict=True):
+        yield [indices[0].key, *map(_total_index_text, indices)]
 
 
-def _part(one: Index) -> str:
+def _total_index_text(index: Index) -> str:
     """The total index of a tolerance in per cent, with its interval; 0 where it cannot be told from 0."""
-    low, high = number(100.0 * one.total.low), number(100.0 * one.total.high)
-    if not one.total_is_certain:
+    low, high = number(100.0 * index.total.low), number(100.0 * index.total.high)
+    if not index.total_is_certain:
         return typed(f"0, as far as can be told ({low} to {high} %)")
-    return typed(f"{percent(one.total.value)} ({low} to {high} %)")
+    return typed(f"{percent(index.total.value)} ({low} to {high} %)")
 
 
 def narrower_rows(result: ToleranceStudy) -> Iterator[list[str]]:
-    """Of each tolerance, half as wide, the share of devices with the wall, and the gain."""
-    for one in result.tightened:
-        gain = _gain(one.gain)
-        yield [one.key, share_text(one.share), gain if one.is_certain else f"0, as far as can be told: {gain}"]
+    """Rows of cells: of each tolerance its key, and if it were half as wide the share of devices, and the gain."""
+    for narrower in result.tightened:
+        gain = _gain_text(narrower.gain)
+        yield [
+            narrower.key,
+            share_text(narrower.share),
+            gain if narrower.is_certain else f"0, as far as can be told: {gain}",
+        ]
 
 
 def no_index_sentences(result: ToleranceStudy) -> Iterator[str]:
     """Which outcomes have no index, and why."""
-    for one in result.indices:
-        if not one.indices:
-            yield f"no index of {one.name}: {one.reason}"
+    for indices in result.indices:
+        if not indices.indices:
+            yield f"no index of {indices.name}: {indices.reason}"
 
 
 def advice_sentence(result: ToleranceStudy) -> str:
@@ -397,7 +403,7 @@ def advice_sentence(result: ToleranceStudy) -> str:
     if not best:
         return f"{result.question.samples} devices do not tell that half of any tolerance would help; draw more"
     first = best[0]
-    change = f"{typed(percent(share.value))} to {share_text(first.share)}, by {_gain(first.gain)}"
+    change = f"{typed(percent(share.value))} to {share_text(first.share)}, by {_gain_text(first.gain)}"
     words = f"half its tolerance raises {change}"
     if len(best) == 1:
         return f"tighten {first.key} first: {words}"
@@ -417,7 +423,7 @@ def _middle_text(result: ToleranceStudy) -> str:
     return f"the device in the middle of the tolerances {what}"
 
 
-def _gain(gain: Interval) -> str:
+def _gain_text(gain: Interval) -> str:
     """A gain in percentage points, with its interval."""
     value, low, high = (number(100.0 * one) for one in (gain.value, gain.low, gain.high))
     return typed(f"{value} percentage points ({low} to {high})")
@@ -427,12 +433,15 @@ def _advice_without_wall(result: ToleranceStudy) -> str:
     """Which tolerance has the largest part in the spread of the largest stiffness, where no wall is wanted."""
     if not result.middle_is_stable:
         return f"which tolerance to tighten first is not known, for {_middle_text(result)}"
-    outcome = next((one for one in result.indices if one.name == "stiffness_max" and one.indices), None)
-    certain = [one for one in outcome.indices if one.total_is_certain] if outcome is not None else []
+    outcome = next(
+        (indices for indices in result.indices if indices.name == "stiffness_max" and indices.indices), None
+    )
+    certain = [index for index in outcome.indices if index.total_is_certain] if outcome is not None else []
     if not certain:
         return "which tolerance to tighten first is not known"
-    first = max(certain, key=lambda one: one.total.value)
-    rivals = [one.key for one in certain if one is not first and one.total.high >= first.total.low]
+    first = max(certain, key=lambda index: index.total.value)
+    # those whose interval reaches that of the first
+    rivals = [index.key for index in certain if index is not first and index.total.high >= first.total.low]
     part = f"it has a part in {typed(percent(first.total.value))} of the spread of stiffness_max"
     words = f"tighten {first.key} first: {part}"
     return f"{words}; {' and '.join(rivals)} cannot be told from it" if rivals else words

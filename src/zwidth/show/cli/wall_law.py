@@ -34,8 +34,8 @@ class MatrixType(ParamType):
             rows = [[float(entry) for entry in row.split(",")] for row in value.split(";")]
         except ValueError:
             rows = []
-        sound = bool(rows) and len({len(row) for row in rows}) == 1
-        if not sound or not all(math.isfinite(entry) for row in rows for entry in row):
+        rectangular = bool(rows) and len({len(row) for row in rows}) == 1
+        if not rectangular or not all(math.isfinite(entry) for row in rows for entry in row):
             self.fail(f"must be numbers such as 1,0.2 or rows such as '1,0.1;0.1,0.5', got {value!r}", param, ctx)
         return rows if len(rows) > 1 else rows[0]
 
@@ -84,7 +84,7 @@ def circumstances(case: CommandLine) -> dict[str, Any]:
 
 
 def rows(stated: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Rows for people on the directions of a wall, of what `circumstances` stated."""
+    """Rows (label, value) on the directions of a wall, of what `circumstances` stated."""
     from zwidth.loop.wall_matrices import ratios_text
 
     together = " and ".join(map(vector, stated.get("directions", ())))
@@ -99,7 +99,10 @@ def rows(stated: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _directions(case: CommandLine) -> list[Any]:
-    """All directions rendered together, the first of them that of every question."""
+    """All directions rendered together, unit vectors: that of --direction, then those of --with-direction.
+
+    Raises  BadInput  where --axis is given
+    """
     question, device = case.question, case.device
     if question.axis is not None:
         raise BadInput(f"{question.name}: --axis and --with-direction do not go together; leave out one of them")

@@ -64,11 +64,11 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
     chart  None: only the conditions, over the dampings at which they admit stiffness
     """
     known = [bound for bound in bounds if not bound.lacking]
-    top = _highest(known, chart)
+    top = _largest_in_view(known, chart)
     dampings = np.linspace(0.0, top[1], DAMPINGS)
     numbers = count(1)
-    met = _lines([bound for bound in known if bound.holds], dampings, top[0], numbers)
-    not_met = _lines([bound for bound in known if not bound.holds], dampings, top[0], numbers)
+    met = _lines_in_view([bound for bound in known if bound.holds], dampings, top[0], numbers)
+    not_met = _lines_in_view([bound for bound in known if not bound.holds], dampings, top[0], numbers)
     stable: list[Any] = []
     if chart is not None:
         text = "stable, exact" if chart.regions else "stable, exact: no wall"
@@ -77,19 +77,19 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
             ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none"))
         for arc in chart.boundary:
             ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=0.8)
-    looks = [_look(n, met=n < len(met)) for n in range(len(met) + len(not_met))]
+    looks = [_line_look(n, met=n < len(met)) for n in range(len(met) + len(not_met))]
     for line, look in zip((*met, *not_met), looks, strict=True):
         ax.plot(line.stiffness, dampings, zorder=2.5 if line in met else 1.5, **look)
     _number_lines(ax, [*met, *not_met], looks, dampings, top)
-    first = stable + _entries(known, met, looks[: len(met)], met=True)
-    second = _entries(known, not_met, looks[len(met) :], met=False)
-    if len(first) > len(stable):  # a column each
-        rows = max(len(first), len(second))
-        entries = [*_filled(first, rows), *_filled(second, rows)]
+    entries_met = stable + _legend_entries(known, met, looks[: len(met)], met=True)
+    entries_not_met = _legend_entries(known, not_met, looks[len(met) :], met=False)
+    if len(entries_met) > len(stable):  # a column each
+        rows = max(len(entries_met), len(entries_not_met))
+        entries = [*_padded(entries_met, rows), *_padded(entries_not_met, rows)]
     else:
-        entries = [*first, *second]
+        entries = [*entries_met, *entries_not_met]
     frame(ax, (0.0, top[0], 0.0, top[1]), empty=False)
-    made = ax.legend(
+    legend = ax.legend(
         handles=entries,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.01),
@@ -102,10 +102,10 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
         frameon=False,
         alignment="left",
     )
-    made.set_zorder(6.0)
+    legend.set_zorder(6.0)
 
 
-def _look(n: int, *, met: bool) -> dict[str, Any]:
+def _line_look(n: int, *, met: bool) -> dict[str, Any]:
     """Colour, dashes and width of the n-th line; beyond the number of colours each has the next one's dashes."""
     coloured = LINES[1:]
     turns, place = divmod(n, len(coloured))
@@ -113,15 +113,15 @@ def _look(n: int, *, met: bool) -> dict[str, Any]:
     return {"color": coloured[place][0], "linestyle": dashes, "linewidth": 1.8 if met else 1.0}
 
 
-def _lines(bounds: Sequence[Bound], dampings: Floats, widest: float, numbers: Any) -> list[BoundLine]:
-    """The lines in view, each with the conditions that it is of.
+def _lines_in_view(bounds: Sequence[Bound], dampings: Floats, widest: float, numbers: Any) -> list[BoundLine]:
+    """The lines in view, each with the conditions that it is of; a condition without a line in view is left out.
 
     widest   largest stiffness of the view [N/m];   numbers  iterator of the legend's numbers, one a condition
     """
     lines: list[BoundLine] = []
     for bound in bounds:
         stiffness = bound.stiffness_max_at(dampings)
-        # what is out of view leaves it at its border
+        # cut just beyond the view's border; a line that stays within 0.5 % of that border or beyond has no place
         stiffness = np.where(stiffness > 0.0, np.minimum(stiffness, 1.01 * widest), np.nan)
         if not np.any(stiffness < 1.005 * widest):
             continue
@@ -138,39 +138,42 @@ def _alike(one: Floats, other: Floats, scale: float) -> bool:
     return bool(np.all(both) and np.nanmax(np.abs(one - other), initial=0.0) < ALIKE * scale)
 
 
-def _entries(
+def _legend_entries(
     known: Sequence[Bound], lines: Sequence[BoundLine], looks: Sequence[dict[str, Any]], *, met: bool
 ) -> list[Any]:
-    """The legend's lines for conditions whose assumptions are met, or are not; those without a line last."""
+    """The legend's entries for conditions whose assumptions are met, or are not; those without a line last.
+
+    known  all conditions, met and not met;   lines, looks  those of the conditions that are wanted
+    """
     drawn = [(n, bound, look) for line, look in zip(lines, looks, strict=True) for n, bound in line.bounds.items()]
     limits = [bound.stiffness_max for _, bound, _ in drawn if met and bound.stiffness_max > 0.0]
-    lowest = min(limits, default=0.0) * (1.0 + 1e-6)
+    lowest = min(limits, default=0.0) * (1.0 + 1e-6)  # several conditions may be the strictest
     entries: list[Any] = []
     if not met and any(not bound.holds for bound in known):
-        entries.append(_without_line(NOT_MET))
+        entries.append(_text_entry(NOT_MET))
     for n, bound, look in sorted(drawn, key=lambda one: one[0]):
         strictest = met and 0.0 < bound.stiffness_max <= lowest
         limit = f", at most {quantity(bound.stiffness_max, 'N/m')}: strictest" if strictest else ""
-        text = "\n".join(wrap(f"{n}\u00a0 {_named(bound)}{limit}", LETTERS, break_long_words=False))
+        text = "\n".join(wrap(f"{n}\u00a0 {_condition_text(bound)}{limit}", LETTERS, break_long_words=False))
         entries.append(Line2D([], [], label=text, **look))
     drawn_bounds = [bound for _, bound, _ in drawn]
     unseen = (bound for bound in known if bound.holds == met and bound not in drawn_bounds)
-    texts = (f"{_named(bound)}: no line in view" for bound in unseen)
-    return entries + [_without_line("\n".join(wrap(text, LETTERS))) for text in texts]
+    texts = (f"{_condition_text(bound)}: no line in view" for bound in unseen)
+    return entries + [_text_entry("\n".join(wrap(text, LETTERS))) for text in texts]
 
 
-def _named(bound: Bound) -> str:
+def _condition_text(bound: Bound) -> str:
     """A condition with its authors and year, or the equation that it has in the thesis."""
     short = SHORT_SOURCE.match(bound.source)
     return f"{bound.name}, {short[0] if short else bound.source}"
 
 
-def _filled(entries: list[Any], rows: int) -> list[Any]:
+def _padded(entries: list[Any], rows: int) -> list[Any]:
     """The entries, with empty ones after them up to so many rows."""
-    return entries + [_without_line("") for _ in range(rows - len(entries))]
+    return entries + [_text_entry("") for _ in range(rows - len(entries))]
 
 
-def _without_line(text: str) -> Line2D:
+def _text_entry(text: str) -> Line2D:
     """A legend's entry of text alone."""
     return Line2D([], [], linestyle="none", label=text)
 
@@ -201,9 +204,9 @@ def _number_lines(
         places = (inside if len(inside) else across[k][np.isfinite(across[k]).all(axis=1)])[::-1]
         places = places[np.linspace(0, len(places) - 1, min(STEPS, len(places))).astype(int)]
         others = [other[np.isfinite(other).all(axis=1)] for n, other in enumerate(across) if n != k]
-        clear = np.minimum(_distance(places, np.vstack([*others, np.full((1, 2), OUTSIDE)])), FAR)
+        clear = np.minimum(_nearest_distances(places, np.vstack([*others, np.full((1, 2), OUTSIDE)])), FAR)
         # numbers, which are wider than lines, count twice
-        clear += 2.0 * np.minimum(_distance(places, np.vstack([*placed, np.full((1, 2), OUTSIDE)])), FAR)
+        clear += 2.0 * np.minimum(_nearest_distances(places, np.vstack([*placed, np.full((1, 2), OUTSIDE)])), FAR)
         x, y = places[int(np.argmax(clear))]
         placed.append(np.array([[x, y]]))
         _write_number(ax, line.text, (x, y), top, looks[k]["color"])
@@ -217,7 +220,10 @@ def _write_number(
     colour: str,
     tip: tuple[float, float] | None = None,
 ) -> None:
-    """A number at a place, a share of the view; with a tip, a stroke leads from there to what it names."""
+    """Write a number at a place; with a tip, a stroke leads from there to what it names.
+
+    place, tip  (K, B) as shares of the view;   top  largest stiffness and damping of the view [N/m], [N s/m]
+    """
     end = place if tip is None else tip
     ax.annotate(
         text,
@@ -234,13 +240,16 @@ def _write_number(
     )
 
 
-def _distance(points: Floats, others: Floats) -> Floats:
-    """Of each point (n, 2) from the nearest of others (k, 2)."""
+def _nearest_distances(points: Floats, others: Floats) -> Floats:
+    """Distance (n,) of each point (n, 2) from the nearest of others (k, 2)."""
     return np.asarray(np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1))
 
 
-def _highest(bounds: Sequence[Bound], chart: StabilityChart | None) -> tuple[float, float]:
-    """Stiffness and damping up to which is drawn: 20 % beyond the exact chart, else beyond the conditions."""
+def _largest_in_view(bounds: Sequence[Bound], chart: StabilityChart | None) -> tuple[float, float]:
+    """Return the largest stiffness [N/m] and damping [N s/m] of the view.
+
+    They are 20 % beyond the exact chart; without one, beyond what the conditions admit.
+    """
     if chart is not None and chart.stiffness_max > 0.0:
         return 1.2 * chart.stiffness_max, 1.2 * max(chart.damping_max, chart.damping_at_stiffness_max)
     largest = [bound.stiffness_max for bound in bounds if bound.stiffness_max > 0.0]

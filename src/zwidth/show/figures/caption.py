@@ -37,20 +37,21 @@ ROUND_A_PLANE: Final = ("ByDirection",)  # results that have no single direction
 NONLINEAR: Final = ("ContactSimulation", "TimeResponse", "MechanismMotion", "LimitCyclePrediction", "Experiment")
 
 
-def write_caption(made: Figure, paragraphs: Sequence[str]) -> None:
+def write_caption(drawing: Figure, paragraphs: Sequence[str]) -> None:
     """Write paragraphs below a figure in small letters, wrapped to its width; the figure grows by their height.
 
     Sizes of letters are those of the font that comes with matplotlib, so that lines break alike everywhere.
     """
-    width, height = made.get_size_inches()
+    width, height = drawing.get_size_inches()
+    # 72 points to the inch
     room = 72.0 * (width - 2.0 * MARGIN)
     lines = [line for paragraph in paragraphs for line in wrapped(_with_known_letters(paragraph), room, SIZE)]
     if not lines:
         return
     added = len(lines) * LEADING * SIZE / 72.0 + MARGIN
     with context():
-        made.set_size_inches(width, height + added)
-        made.supxlabel(
+        drawing.set_size_inches(width, height + added)
+        drawing.supxlabel(
             "\n".join(lines),
             x=MARGIN / width,
             ha="left",
@@ -67,29 +68,29 @@ def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) ->
     facts  under the keys with which a result states its circumstances; a key that is missing or None is left out
     """
     doubt = f"In doubt: {printable(str(facts['doubt']))}" if facts.get("doubt") else ""
-    first = [part for part in _place(facts) if part]
+    parts = [part for part in _stated_parts(facts) if part]
     name = printable(str(facts.get("name") or ""))
-    about = f"{name}: {', '.join(first)}" if name and first else name or ", ".join(first)
+    about = f"{name}: {', '.join(parts)}" if name and parts else name or ", ".join(parts)
     varied = facts.get("varied") or ()
-    last = [] if controller is None else [computer_text(controller, varied)]
+    remarks = [] if controller is None else [computer_text(controller, varied)]
     if varied:
-        last.append(f"varied: {', '.join(map(printable, varied))}")
+        remarks.append(f"varied: {', '.join(map(printable, varied))}")
     if error_band := facts.get("error_band"):
-        last.append(f"band: {error_band}")
+        remarks.append(f"band: {error_band}")
     if left_out := facts.get("left_out"):
-        last.append(omission_text(left_out))
-    return [paragraph for paragraph in (doubt, about, "; ".join(filter(None, last))) if paragraph]
+        remarks.append(omission_text(left_out))
+    return [paragraph for paragraph in (doubt, about, "; ".join(filter(None, remarks))) if paragraph]
 
 
 def caption_of_result(result: Any) -> list[str]:
     """The paragraphs of a result's caption: of its operating point, its loop or its study; [] of a bare number."""
-    at = result.operating_point or getattr(result, "point", None)
+    operating_point = result.operating_point or getattr(result, "point", None)
     linear = type(result).__name__ not in NONLINEAR
-    if at is not None:
-        facts = facts_of_point(at, linear=linear) | facts_of_wall(result) | facts_of_doubt(result)
+    if operating_point is not None:
+        facts = facts_of_point(operating_point, linear=linear) | facts_of_wall(result) | facts_of_doubt(result)
         facts |= {"directions": None} if type(result).__name__ in ROUND_A_PLANE else {}
         facts |= facts_of_members(getattr(result, "members", ()))
-        return caption_of_facts(facts, at.controller)
+        return caption_of_facts(facts, operating_point.controller)
     if (study := getattr(result, "study", None)) is not None:
         return caption_of_facts(facts_of_study(study), study.device.controller)
     if (circumstances := getattr(result, "circumstances", None)) is not None:
@@ -103,25 +104,30 @@ def caption_of_result(result: Any) -> list[str]:
     return caption_of_facts({"left_out": left_out} | facts_of_wall(result) | doubt, loop.controller)
 
 
-def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
+def facts_of_point(operating_point: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
     """Facts of an operating point for a caption; without position and direction where there are many."""
-    omitted = (at.linear_omissions if linear else ()) + at.load_omissions
-    facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": omitted}
-    if at.model != "motor-mass" and (at.operator is not None or at.arm is not None):
-        facts["operator"] = at.operator_name or AS_GIVEN
-    if at.load is not None:
-        facts["load"] = table_of_load(at.load)
-    if at.posture is not None and at.directions is not None:
-        facts["assembly"] = at.posture.assembly
-        if not at.shape:
-            facts |= {"position_m": at.posture.position, "directions": at.directions}
-            if (law := at.wall_matrices) is not None:
+    omitted = (operating_point.linear_omissions if linear else ()) + operating_point.load_omissions
+    facts: dict[str, Any] = {"name": operating_point.name, "model": operating_point.model, "left_out": omitted}
+    if operating_point.model != "motor-mass" and (
+        operating_point.operator is not None or operating_point.arm is not None
+    ):
+        facts["operator"] = operating_point.operator_name or AS_GIVEN
+    if operating_point.load is not None:
+        facts["load"] = table_of_load(operating_point.load)
+    if operating_point.posture is not None and operating_point.directions is not None:
+        facts["assembly"] = operating_point.posture.assembly
+        if not operating_point.shape:
+            facts |= {"position_m": operating_point.posture.position, "directions": operating_point.directions}
+            if (law := operating_point.wall_matrices) is not None:
                 facts |= {"relative_stiffness": law.stiffness, "relative_damping": law.damping}
     return facts
 
 
 def facts_of_members(members: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The numbers in which the members of a family differ; nothing of who holds the handle, if that is one."""
+    """Facts for a caption: `varied`, the paths in which the members of a family differ.
+
+    members  path -> value of each. Where the operator is one of the paths, `operator` is None: no one holds all
+    """
     varied = list(dict.fromkeys(path for member in members for path in member))
     return {"varied": varied} | ({"operator": None} if "operator" in varied else {})
 
@@ -149,7 +155,7 @@ def facts_of_study(study: Study) -> dict[str, Any]:
 
 
 def wall_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
-    """The wall or environment of a result, from its document."""
+    """Facts for a caption: `environment` and its `parameters` of a result, from its document; {} of none."""
     if document.get("environment") is not None:
         return {key: document.get(key) for key in ("environment", "parameters")}
     values = {name: document.get(f"wall_{name}_{unit}") for name, unit in WALL_UNITS.items()}
@@ -171,7 +177,7 @@ def facts_of_doubt(result: Any) -> dict[str, Any]:
 
 
 def facts_of_wall(result: Any) -> dict[str, Any]:
-    """The wall that a result is about, where it is about one."""
+    """Facts for a caption: `environment` and its `parameters` that a result is about; {} where there is none."""
     environment = getattr(result, "environment", None)
     if environment is not None and hasattr(result, "parameters"):
         return {"environment": environment.name, "parameters": result.parameters}
@@ -179,7 +185,7 @@ def facts_of_wall(result: Any) -> dict[str, Any]:
     return {} if values["stiffness"] is None else {"environment": "wall", "parameters": values}
 
 
-def _place(facts: Mapping[str, Any]) -> Iterator[str]:
+def _stated_parts(facts: Mapping[str, Any]) -> Iterator[str]:
     """Posture, direction, model, operator and wall, in that order, each as far as it is stated."""
     if facts.get("position_m") is not None:
         yield f"handle at {point(facts['position_m'])}"
@@ -188,36 +194,36 @@ def _place(facts: Mapping[str, Any]) -> Iterator[str]:
         yield f"plane {facts['plane']} through {point(facts['plane_through_m'])}"
     if facts.get("assembly"):
         yield f"assembly {printable(facts['assembly'])}"
-    yield _direction(facts)
+    yield _direction_text(facts)
     if facts.get("model") not in (None, "full", AS_GIVEN):
         yield f"{facts['model']} model"
     if facts.get("operator") not in (None, "none"):
         yield f"held by {operator_text(facts['operator'])}"
     if facts.get("load"):
         yield f"under {load_text(load_of_table(dict(facts['load'])))}"
-    yield _environment(facts)
+    yield _environment_text(facts)
 
 
-def _direction(facts: Mapping[str, Any]) -> str:
+def _direction_text(facts: Mapping[str, Any]) -> str:
     """The rendered direction in words, or several with their law; "" where none is stated."""
     direction = facts.get("direction")
     if isinstance(direction, str):
         return f"along the {direction} direction of each cell"
-    together = facts.get("directions")
-    if together is None and direction is not None:
-        together = [direction]
-    if together is None:
+    directions = facts.get("directions")
+    if directions is None and direction is not None:
+        directions = [direction]
+    if directions is None:
         return ""
-    law = ", under one wall law" if len(together) > 1 else ""
+    law = ", under one wall law" if len(directions) > 1 else ""
     if facts.get("relative_stiffness") is not None:
         law = f", {WallMatrices(facts['relative_stiffness'], facts['relative_damping'])}"
-    ways = [way(one) for one in together]
-    if all(one.startswith("along ") for one in ways[1:]):
-        ways[1:] = [one.removeprefix("along ") for one in ways[1:]]
-    return f"{' and '.join(ways)}{law}"
+    texts = [way(one) for one in directions]
+    if all(one.startswith("along ") for one in texts[1:]):
+        texts[1:] = [one.removeprefix("along ") for one in texts[1:]]
+    return f"{' and '.join(texts)}{law}"
 
 
-def _environment(facts: Mapping[str, Any]) -> str:
+def _environment_text(facts: Mapping[str, Any]) -> str:
     """The wall or environment with its parameters in words; "" where none is stated."""
     environment, values = facts.get("environment"), facts.get("parameters") or {}
     if environment in (None, "none"):

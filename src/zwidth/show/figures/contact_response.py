@@ -29,12 +29,12 @@ WORTH: Final = 1e-3  # share of the largest energy below which an entry is no li
 
 def contact_figure() -> tuple[Figure, list[Axes]]:
     """A figure with the three panels that `draw_contact` takes, their times aligned."""
-    made, first = figure(6.2, 6.6)
+    drawing, first = figure(6.2, 6.6)
     with context():
-        grid = made.add_gridspec(3, 1, height_ratios=(1.4, 1.0, 1.0))
+        grid = drawing.add_gridspec(3, 1, height_ratios=(1.4, 1.0, 1.0))
         first.set_subplotspec(grid[0])
-        axes = [first, *(made.add_subplot(grid[row], sharex=first) for row in (1, 2))]
-    return made, axes
+        axes = [first, *(drawing.add_subplot(grid[row], sharex=first) for row in (1, 2))]
+    return drawing, axes
 
 
 def draw_contact(axes: Sequence[Axes], response: TimeResponse) -> None:
@@ -46,7 +46,7 @@ def draw_contact(axes: Sequence[Axes], response: TimeResponse) -> None:
     """
     position, force, energy = axes
     window = time_window(response)
-    run = _Part(response.time, window)
+    run = _SamplesWithin(response.time, window)
     draw = draw_envelope if len(run.time) > LONGEST_LINE else draw_line
     draw_position(position, response, window)
     draw(force, run.time, run(response.force), BLUE, "force on the device", held=True)
@@ -71,11 +71,11 @@ def draw_position(ax: Axes, response: TimeResponse, window: tuple[float, float] 
     window  seconds from and to; left out: `time_window`
     """
     window = time_window(response) if window is None else window
-    run = _Part(response.time, window)
+    run = _SamplesWithin(response.time, window)
     draw = draw_envelope if len(run.time) > LONGEST_LINE else draw_line
-    time, handle = _handle(response)
-    # the handle after the last sample belongs to the whole run
-    part = _Part(time, window if window[1] < response.time[-1] else (window[0], np.inf))
+    time, handle = _handle_signal(response)
+    # the handle's trail goes on after the last sample, and is drawn to its end where that sample is drawn
+    part = _SamplesWithin(time, window if window[1] < response.time[-1] else (window[0], np.inf))
     draw(ax, part.time, part(handle), BLACK, "handle")
     draw(ax, run.time, run(response.reading), VERMILION, "counted by the encoders", held=True, dashes=DASHED)
     ax.margins(x=0.0, y=0.08)
@@ -115,17 +115,20 @@ def time_window(response: TimeResponse) -> tuple[float, float]:
         # free motion to the wall and from it is of no interest beyond its beginning
         touching = response.force != 0.0
         happens = happens & touching if (happens & touching).any() else happens
-    at = np.flatnonzero(happens)
-    if not len(at):
+    busy_samples = np.flatnonzero(happens)
+    if not len(busy_samples):
         return whole
-    first, last = float(time[at[0]]), float(time[at[-1]])
+    first, last = float(time[busy_samples[0]]), float(time[busy_samples[-1]])
     lead = LEAD * max(last - first, float(time[1] - time[0]))
     window = max(whole[0], first - 2.0 * lead), min(whole[1], last + lead)
     return window if window[1] - window[0] < PART * (whole[1] - whole[0]) else whole
 
 
-class _Part:
-    """The samples of signals within a window of time."""
+class _SamplesWithin:
+    """The samples of signals within a window of time, and one beside it at either end.
+
+    time  those of these samples [s]
+    """
 
     def __init__(self, time: Floats, window: tuple[float, float]) -> None:
         inside = np.flatnonzero((time >= window[0]) & (time <= window[1]))
@@ -134,11 +137,15 @@ class _Part:
         self.time = time[self.kept]
 
     def __call__(self, values: Floats) -> Floats:
+        """The part of a signal, one value for each time, within the window."""
         return values[self.kept]
 
 
-def _handle(response: TimeResponse) -> tuple[Floats, Floats]:
-    """Time [s] and position of the handle [m], between samples where that was kept; not more than can be seen."""
+def _handle_signal(response: TimeResponse) -> tuple[Floats, Floats]:
+    """Return times (k,) [s] and positions of the handle (k,) [m], between samples where these were kept.
+
+    Of many points so few that they still make the same line.
+    """
     if not response.trail.size:
         return response.time, response.handle
     skip = 1 if len(response.time) > LONGEST_LINE else -(-len(response.trail) // (BETWEEN * LONGEST_LINE))
@@ -160,7 +167,10 @@ def draw_line(
 def draw_envelope(
     ax: Axes, time: Floats, values: Floats, colour: str, text: str, *, held: bool = False, dashes: Any = "-"
 ) -> None:
-    """The band that a signal with too many points for a line sweeps over; with dashes its two edges only."""
+    """The band that a signal with too many points for a line sweeps over; with dashes its two edges only.
+
+    time, values  (k,);   held  makes no difference to a band: it is taken so that `draw_line` can be replaced
+    """
     edges, low, high = binned_extremes(time, values)
     if dashes == "-":
         style: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "linewidth": 0.6, "alpha": 0.55}
@@ -171,7 +181,10 @@ def draw_envelope(
 
 
 def binned_extremes(time: Floats, values: Floats, bins: int = BINS) -> tuple[Floats, Floats, Floats]:
-    """Begin (bins + 1,) of each of so many equal times, smallest and largest value in it; nothing between is lost.
+    """Cut a signal into bins of equal time; no value of it is lost.
+
+    Returns  beginning of each bin [s], smallest and largest value in it, each (bins + 1,): the last entry is the
+             end of the signal, with the extremes of the last bin
 
     Each bin has the last value of the one before, too, so that neighbours touch.
     """
@@ -181,8 +194,12 @@ def binned_extremes(time: Floats, values: Floats, bins: int = BINS) -> tuple[Flo
     return np.append(time[cut[:-1]], time[-1]), np.append(low, low[-1]), np.append(high, high[-1])
 
 
-def _draw_energies(ax: Axes, response: TimeResponse, run: _Part, draw: Callable[..., None]) -> None:
-    """Draw the stored energy and the largest entries of the energy ledger [J] by `draw`, as lines or as bands."""
+def _draw_energies(ax: Axes, response: TimeResponse, run: _SamplesWithin, draw: Callable[..., None]) -> None:
+    """Draw the stored energy and the largest entries of the energy ledger [J] over time.
+
+    run   takes the part of a signal that is shown
+    draw  `draw_line` or `draw_envelope`
+    """
     draw(ax, run.time, run(response.stored), BLACK, "stored")
     size = np.abs(response.energies).max(axis=0)
     worth = [i for i in np.argsort(-size)[:LEDGER] if size[i] > WORTH * size.max()]

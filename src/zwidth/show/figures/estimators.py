@@ -27,7 +27,7 @@ def draw_gain(ax: Axes, methods: Mapping[str, VelocityMethod], period: float) ->
     def gain(method: VelocityMethod, frequency: Floats) -> Floats:
         return np.asarray(np.abs(relative_response(method, period, frequency)))
 
-    _draw(ax, methods, period, gain)
+    _draw_methods(ax, methods, period, gain)
     ax.set_ylabel("Estimated per true velocity")
 
 
@@ -37,11 +37,11 @@ def draw_phase_delay(ax: Axes, methods: Mapping[str, VelocityMethod], period: fl
     methods  label -> method
     period   T [s]
     """
-    _draw(ax, methods, period, lambda method, frequency: phase_delay(method, period, frequency))
+    _draw_methods(ax, methods, period, lambda method, frequency: phase_delay(method, period, frequency))
     label(ax.yaxis, "Phase delay", "s")
 
 
-def _draw(
+def _draw_methods(
     ax: Axes,
     methods: Mapping[str, VelocityMethod],
     period: float,

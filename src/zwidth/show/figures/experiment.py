@@ -47,16 +47,25 @@ class ErrorBarPoint(NamedTuple):
 
 def measured_bars(points: Iterable[MeasuredPoint]) -> list[ErrorBarPoint]:
     """Points of a virtual experiment, with the lowest and highest of their trials."""
-    return [ErrorBarPoint(p.stiffness, p.damping, p.edge, p.low, p.high, p.unsure) for p in points]
+    return [
+        ErrorBarPoint(point.stiffness, point.damping, point.edge, point.low, point.high, point.unsure)
+        for point in points
+    ]
 
 
 def own_bars(points: Iterable[UserPoint]) -> list[ErrorBarPoint]:
     """Points of somebody's own; one that names neither edge nor verdict is drawn as an edge."""
     return [
-        ErrorBarPoint(p.stiffness, p.damping, p.edge, p.stiffness_low, p.stiffness_high)
-        if p.edge == "tip"
-        else ErrorBarPoint(p.stiffness, p.damping, p.edge or p.verdict or "lower", p.damping_low, p.damping_high)
-        for p in points
+        ErrorBarPoint(point.stiffness, point.damping, point.edge, point.stiffness_low, point.stiffness_high)
+        if point.edge == "tip"
+        else ErrorBarPoint(
+            point.stiffness,
+            point.damping,
+            point.edge or point.verdict or "lower",
+            point.damping_low,
+            point.damping_high,
+        )
+        for point in points
     ]
 
 
@@ -79,32 +88,34 @@ def draw_experiment(
     for arc in () if chart is None else chart.boundary:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=1.0, solid_capstyle="round")
     for edge, (colour, marker) in EDGE_STYLES.items():
-        _draw(ax, [p for p in points if p.edge == edge], colour, marker, TITLES[edge], filled=False)
-    _cross(ax, [p for p in points if p.unsure])
+        _draw_points(
+            ax, [point for point in points if point.edge == edge], colour, marker, TITLES[edge], filled=False
+        )
+    _draw_crosses(ax, [point for point in points if point.unsure])
     for looks, kinds, filled in OWN_POINT_STYLES:
-        _draw(ax, [p for p in own_points if p.edge in kinds], BLACK, *looks, filled=filled)
-    frame(ax, window or _window(points, own_points, chart), empty=False)
+        _draw_points(ax, [point for point in own_points if point.edge in kinds], BLACK, *looks, filled=filled)
+    frame(ax, window or _default_window(points, own_points, chart), empty=False)
     legend_above(ax, columns=2)
 
 
-def _draw(
+def _draw_points(
     ax: Axes, points: Sequence[ErrorBarPoint], colour: str, marker: str, title: str, *, filled: bool
 ) -> None:
     """Draw points as marks of one kind, with bars along what was bisected: of tips the stiffness."""
     if not points:
         return
-    for upright in (True, False):
-        some = [p for p in points if (p.edge != "tip") == upright and p.high > p.low]
-        if some:
-            places = np.array([(p.stiffness, p.damping) for p in some])
-            at = places[:, 1 if upright else 0]
-            ends = np.abs(np.array([(p.low, p.high) for p in some]).T - at)
+    for upright in (True, False):  # bars of points on an edge, along damping; then of tips, along stiffness
+        with_bars = [point for point in points if (point.edge != "tip") == upright and point.high > point.low]
+        if with_bars:
+            places = np.array([(point.stiffness, point.damping) for point in with_bars])
+            bisected = places[:, 1 if upright else 0]
+            ends = np.abs(np.array([(point.low, point.high) for point in with_bars]).T - bisected)
             x, y = places.T
             up, across = (ends, None) if upright else (None, ends)
             ax.errorbar(x, y, up, across, fmt="none", ecolor=colour, elinewidth=1.0, capsize=2.2, zorder=4.0)
     ax.plot(
-        [p.stiffness for p in points],
-        [p.damping for p in points],
+        [point.stiffness for point in points],
+        [point.damping for point in points],
         marker=marker,
         markersize=4.5,
         markerfacecolor=colour if filled else "white",
@@ -116,23 +127,23 @@ def _draw(
     )
 
 
-def _cross(ax: Axes, unsure: Sequence[ErrorBarPoint]) -> None:
+def _draw_crosses(ax: Axes, unsure: Sequence[ErrorBarPoint]) -> None:
     """Crosses over the points whose verdict changes more than once."""
     if unsure:
-        K, B = [p.stiffness for p in unsure], [p.damping for p in unsure]
+        K, B = [point.stiffness for point in unsure], [point.damping for point in unsure]
         title = "unsure: verdict changes more than once"
         ax.plot(K, B, "x", color=BLACK, markersize=7.0, markeredgewidth=0.9, zorder=6.0, label=title)
 
 
-def _window(
-    points: Sequence[ErrorBarPoint], others: Sequence[ErrorBarPoint], chart: StabilityChart | None
+def _default_window(
+    points: Sequence[ErrorBarPoint], own_points: Sequence[ErrorBarPoint], chart: StabilityChart | None
 ) -> Window:
-    """What is shown, K and B from and to: K >= 0, the points with their bars, and what of the chart lies there."""
+    """KMIN, KMAX, BMIN, BMAX of what is shown: the points with their bars, and the chart about them."""
     K, B = [0.0], [0.0]
-    for p in (*points, *others):
-        ends = [end for end in (p.low, p.high) if np.isfinite(end)]
-        K += [p.stiffness, *(ends if p.edge == "tip" else [])]
-        B += [p.damping, *([] if p.edge == "tip" else ends)]
+    for point in (*points, *own_points):
+        ends = [end for end in (point.low, point.high) if np.isfinite(end)]
+        K += [point.stiffness, *(ends if point.edge == "tip" else [])]
+        B += [point.damping, *([] if point.edge == "tip" else ends)]
     if chart is not None and chart.regions:
         # a chart that reaches many times farther would press the points into a corner
         _, K1, B0, B1 = chart.box

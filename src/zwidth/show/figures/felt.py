@@ -61,13 +61,14 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
     if isfinite(chart.stiffness_max):
         text = f"hardest felt contact: {quantity(chart.stiffness_max, 'N/m')}"
         ax.axvline(chart.stiffness_max, color=VERMILION, linewidth=0.9, linestyle=":", label=text)
-    if 0.0 < chart.limit < 4.0 * widest:
+    if 0.0 < chart.limit < 4.0 * widest:  # one farther away would press the walls into a corner
         text = f"{LIMIT_HEADINGS[chart.limit_kind]} {quantity(chart.limit, 'N/m')}"
         ax.axvline(chart.limit, color=GREY, linestyle=(0, (6, 3)), linewidth=0.9, label=text)
         widest = max(widest, chart.limit)
     walls = np.vstack(chart.regions) if chart.regions else np.array([[0.0, 0.0], [1.0, 1.0]])
     low, high = float(walls[:, 1].min()), float(walls[:, 1].max())
     ax.set_xlim(0.0, 1.05 * widest)
+    # room below only where damping may be negative
     ax.set_ylim(low - 0.05 * (high - low) * (low < 0.0), high + 0.05 * (high - low))
     if low < 0.0:
         ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.5)

@@ -51,7 +51,7 @@ def draw_guarantees(ax: Axes, guarantees: Guarantees, window: Window | None = No
     window  what to show; left out: the box of the part of the chart with K and B above 0, and 5 %
     """
     _draw_sets(ax, guarantees)
-    view = window or _box(guarantees)
+    view = window or _default_window(guarantees)
     small = [ring for one in guarantees.guarantees for ring in one.region.rings if _is_small(ring, view)]
     frame(ax, view, empty=not guarantees.chart.regions)
     if small and window is None:
@@ -76,7 +76,7 @@ def _enlarge(ax: Axes, guarantees: Guarantees, walls: Floats) -> None:
 
 
 def _is_small(ring: np.ndarray, view: Window) -> bool:
-    """Whether a ring is too small to be seen in the figure."""
+    """Whether a ring (k, 2) of walls [K, B] is too small to be seen in a view of KMIN, KMAX, BMIN, BMAX."""
     across, up = np.ptp(ring, axis=0) / (view[1] - view[0], view[3] - view[2])
     return bool(min(across, up) < SMALL)
 
@@ -91,7 +91,7 @@ def _draw_sets(ax: Axes, guarantees: Guarantees) -> None:
         if name in by_name:
             guarantee = by_name[name]
             for n, ring in enumerate(guarantee.region.rings or (np.full((1, 2), np.nan),)):
-                text = "" if n else _words(guarantee)
+                text = "" if n else _legend_text(guarantee)
                 ax.plot(*ring.T, color=colour, linestyle=dashes, zorder=3.0, label=text)
 
 
@@ -102,8 +102,8 @@ def draw_region(ax: Axes, region: Region) -> None:
         ax.add_patch(Polygon(ring, facecolor=fill, edgecolor=edge, linewidth=EDGE))
     corners = np.vstack(region.rings) if region.rings else np.array([[0.0, 0.0], [1.0, 1.0]])
     (K0, B0), (K1, B1) = corners.min(axis=0), corners.max(axis=0)
-    K, B = ROOM * (K1 - K0), ROOM * (B1 - B0)
-    frame(ax, (float(K0 - K), float(K1 + K), float(B0 - B), float(B1 + B)), empty=False)
+    room_K, room_B = ROOM * (K1 - K0), ROOM * (B1 - B0)
+    frame(ax, (float(K0 - room_K), float(K1 + room_K), float(B0 - room_B), float(B1 + room_B)), empty=False)
     if not region.rings:
         draw_empty(ax, "\n".join(wrap(region.reason or "no wall has this guarantee", REASON)))
 
@@ -119,9 +119,13 @@ def draw_couplings(ax: Axes, couplings: Couplings) -> None:
     for depth, (name, region, fill, hatch, edge) in enumerate(sets):
         _draw_coupling_set(ax, region, _with_peak(name, region), (fill, hatch, edge), 1.0 + 0.1 * depth)
     walls = np.vstack([*rings, [[0.0, 0.0]]])
-    k1 = float(walls[:, 0].max())
-    b0, b1 = float(walls[:, 1].min()), float(walls[:, 1].max())
-    frame(ax, (0.0, 1.05 * (k1 or 1.0), b0 - 0.05 * (b1 - b0), b1 + 0.05 * (b1 - b0) or 1.0), empty=False)
+    k_high = float(walls[:, 0].max())
+    b_low, b_high = float(walls[:, 1].min()), float(walls[:, 1].max())
+    frame(
+        ax,
+        (0.0, 1.05 * (k_high or 1.0), b_low - 0.05 * (b_high - b_low), b_high + 0.05 * (b_high - b_low) or 1.0),
+        empty=False,
+    )
     label(ax.xaxis, "Coupling stiffness k", "N/m")
     label(ax.yaxis, "Coupling damping b", "N s/m")
     legend_above(ax, columns=1)
@@ -133,7 +137,7 @@ def _draw_set(ax: Axes, guarantee: Guarantee, look: tuple[str, str, Any, float],
     look  fill, colour and dashes of the edge, and height of the edge, as in FILLS
     """
     fill, edge, dashes, above = look
-    rings, text = guarantee.region.rings, _words(guarantee)
+    rings, text = guarantee.region.rings, _legend_text(guarantee)
     if not rings:
         ax.plot([], [], color="none", label=text)
         return
@@ -160,7 +164,7 @@ def _draw_coupling_set(ax: Axes, region: Region, text: str, look: tuple[str, str
     ax.add_patch(key)
 
 
-def _words(guarantee: Guarantee) -> str:
+def _legend_text(guarantee: Guarantee) -> str:
     """What a guarantee is called in the legend, with its largest stiffness."""
     return _with_peak(WORDS.get(guarantee.name, guarantee.name), guarantee.region)
 
@@ -172,7 +176,7 @@ def _with_peak(words: str, region: Region) -> str:
     return f"{words}: {quantity(region.stiffness_max, 'N/m')}"
 
 
-def _box(guarantees: Guarantees) -> Window:
-    """What is shown: the chart with a little of what lies below K = 0 and B = 0; K and B, from and to."""
+def _default_window(guarantees: Guarantees) -> Window:
+    """The window KMIN, KMAX, BMIN, BMAX of the chart with a little of what lies below K = 0 and B = 0."""
     K0, K1, B0, B1 = guarantees.chart.box
     return max(K0, -0.05 * K1), K1, max(B0, -0.2 * B1), B1

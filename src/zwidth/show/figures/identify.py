@@ -69,13 +69,13 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
     if not measured:
         draw_empty(ax, identification.reason or "nothing was fitted")
         return
-    some = slice(0, SHOWN)
-    time = np.asarray(curves["time_s"])[some]
+    first_samples = slice(0, SHOWN)
+    time = np.asarray(curves["time_s"])[first_samples]
     for k, name in enumerate(measured):
         quantity, _, drive = name.removeprefix(MEASURED).partition(".")
         unit = "N" if quantity == "force_N" else "N m"
-        torque = np.asarray(curves[name])[some]
-        predicted = np.asarray(curves[name.replace(MEASURED, PREDICTED, 1)])[some]
+        torque = np.asarray(curves[name])[first_samples]
+        predicted = np.asarray(curves[name.replace(MEASURED, PREDICTED, 1)])[first_samples]
         scale = float(np.max(np.abs(torque), initial=0.0)) or 1.0
         zero = -2.0 * APART * k
         colour, dashes = LINES[1 + k % (len(LINES) - 1)]
@@ -112,8 +112,8 @@ def draw_boundary(ax: Axes, identification: Identification) -> None:
     if not identification.curves:
         draw_empty(ax, identification.reason or "nothing was fitted")
         return
-    _outline(ax, identification.details["boundary_before"], GREY, (0, (4, 2)), "chart before")
-    _outline(ax, identification.details["boundary"], BLACK, "-", "chart fitted")
+    _draw_outline(ax, identification.details["boundary_before"], GREY, (0, (4, 2)), "chart before")
+    _draw_outline(ax, identification.details["boundary"], BLACK, "-", "chart fitted")
     columns = {name: np.array(values) for name, values in identification.curves.items()}
     K, B, kind = columns["stiffness_N_per_m"], columns["damping_Ns_per_m"], columns["kind"]
     fitted = columns["fitted_stiffness_N_per_m"], columns["fitted_damping_Ns_per_m"]
@@ -121,11 +121,11 @@ def draw_boundary(ax: Axes, identification: Identification) -> None:
     for k in np.flatnonzero(on_edge):
         ax.plot([K[k], fitted[0][k]], [B[k], fitted[1][k]], color=VERMILION, linewidth=1.0, zorder=3.0)
     for kinds, marker, colour, filled, title in POINT_STYLES:
-        some = np.isin(kind, kinds)
-        if some.any():
+        chosen = np.isin(kind, kinds)
+        if chosen.any():
             ax.plot(
-                K[some],
-                B[some],
+                K[chosen],
+                B[chosen],
                 marker=marker,
                 markersize=4.5,
                 markerfacecolor=colour if filled else "white",
@@ -134,19 +134,19 @@ def draw_boundary(ax: Axes, identification: Identification) -> None:
                 zorder=4.0,
                 label=title,
             )
-    frame(ax, _window(K, B), empty=False)
+    frame(ax, _default_window(K, B), empty=False)
     legend_above(ax, columns=2)
 
 
-def _outline(ax: Axes, arcs: Sequence[dict[str, Any]], colour: str, dashes: Any, title: str) -> None:
+def _draw_outline(ax: Axes, arcs: Sequence[dict[str, Any]], colour: str, dashes: Any, title: str) -> None:
     """Draw the arcs of a boundary, as a document has them, in one line style; the legend names them once."""
     for n, arc in enumerate(arcs):
         walls = arc["stiffness_N_per_m"], arc["damping_Ns_per_m"]
         ax.plot(*walls, color=colour, linestyle=dashes, linewidth=1.0, label="" if n else title)
 
 
-def _window(K: np.ndarray, B: np.ndarray) -> tuple[float, float, float, float]:
-    """What is shown: the points, K = 0 and B = 0, and a margin; K [N/m] and B [N s/m], from and to."""
+def _default_window(K: np.ndarray, B: np.ndarray) -> tuple[float, float, float, float]:
+    """KMIN, KMAX [N/m], BMIN, BMAX [N s/m] of what is shown: the points, K = 0 and B = 0, and a margin."""
     ends = []
     for values in (K, B):
         low, high = min(float(np.min(values)), 0.0), max(float(np.max(values)), 0.0)
@@ -164,10 +164,10 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
     """Measured friction in segments of the motion, the fitted levels and slopes, and in an inset unseen motion."""
     angular = identification.angular
     velocity, friction = identification.velocity, identification.friction
-    every = max(len(velocity) // MOST_POINTS, 1)
+    stride = max(len(velocity) // MOST_POINTS, 1)
     ax.plot(
-        velocity[::every],
-        friction[::every],
+        velocity[::stride],
+        friction[::stride],
         ".",
         color=GREY,
         markersize=2.5,
@@ -177,6 +177,7 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
     )
     free = identification.details.get("force") is None
     reach = WIDEST * float(np.max(np.abs(velocity), initial=0.0)) or 1.0
+    # level of the dry friction and slope of the viscous one, by the sign of the velocity
     for (level, slope), side, colour, name in (
         (identification.lines[0], 1.0, VERMILION, "forward"),
         (identification.lines[1], -1.0, BLUE, "backward"),
@@ -191,17 +192,18 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
         label(ax.yaxis, "Friction over mass", "rad/s^2" if angular else "m/s^2", plain=True)
     else:
         label(ax.yaxis, "Friction", "N m" if angular else "N")
-    _draw_motion(ax, identification)
+    _draw_unseen_motion(ax, identification)
     legend_above(ax, columns=3)
 
 
-def _draw_motion(ax: Axes, identification: JointIdentification) -> None:
+def _draw_unseen_motion(ax: Axes, identification: JointIdentification) -> None:
     """The first window that was not fitted, measured and predicted, in an inset."""
     names = (
         ("angle_rad", "angle_predicted_rad") if identification.angular else ("position_m", "position_predicted_m")
     )
     time, measured, predicted = (np.asarray(identification.curves[name]) for name in ("time_s", *names))
     steps = np.diff(time)
+    # a window ends where a sample is missing, or where time starts again
     breaks = np.flatnonzero((steps > 1.5 * np.median(steps)) | (steps <= 0.0))
     end = min(int(breaks[0]) + 1 if len(breaks) else len(time), SHOWN_SAMPLES)
     inset = ax.inset_axes(INSET, zorder=5.0)
@@ -225,21 +227,25 @@ FLOOR = 1e-3  # share of the magnitude below which the band's lower end is not d
 
 
 def draw_identified_impedance(ax: Axes, identification: Identification) -> None:
-    """Magnitudes over frequency, both axes logarithmic: measured with bands, predicted in black."""
+    """Magnitudes of impedance over frequency, wall on and off: measured with bands, predicted in black."""
     if not identification.curves:
         draw_empty(ax, identification.reason or "nothing was measured")
         return
     columns = {name: np.array(values) for name, values in identification.curves.items()}
     for state, colour, title in STATE_STYLES:
-        some = columns["wall"] == state
-        if not some.any():
+        of_state = columns["wall"] == state
+        if not of_state.any():
             continue
-        f = columns["frequency_Hz"][some]
-        size = np.hypot(columns["impedance_real_Ns_per_m"][some], columns["impedance_imag_Ns_per_m"][some])
-        low = np.maximum(columns["impedance_low_Ns_per_m"][some], FLOOR * size)
-        ax.fill_between(f, low, columns["impedance_high_Ns_per_m"][some], color=colour, alpha=0.25, linewidth=0.0)
+        f = columns["frequency_Hz"][of_state]
+        size = np.hypot(columns["impedance_real_Ns_per_m"][of_state], columns["impedance_imag_Ns_per_m"][of_state])
+        low = np.maximum(columns["impedance_low_Ns_per_m"][of_state], FLOOR * size)
+        ax.fill_between(
+            f, low, columns["impedance_high_Ns_per_m"][of_state], color=colour, alpha=0.25, linewidth=0.0
+        )
         ax.loglog(f, size, color=colour, label=f"measured, {title}, with its band (95 % each)")
-        predicted = np.hypot(columns["predicted_real_Ns_per_m"][some], columns["predicted_imag_Ns_per_m"][some])
+        predicted = np.hypot(
+            columns["predicted_real_Ns_per_m"][of_state], columns["predicted_imag_Ns_per_m"][of_state]
+        )
         if np.isfinite(predicted).any():
             dashes = "-" if state == "off" else (0, (5, 1.5))
             ax.loglog(f, predicted, color=BLACK, linestyle=dashes, linewidth=0.9, label=f"predicted, {title}")
@@ -273,10 +279,12 @@ def draw_modes(ax: Axes, identification: Any) -> None:
         if np.any(chosen & (measured > 0.0)):
             ax.loglog(f[chosen], measured[chosen], ".", markersize=2.5, color=colour, label=text)
     ax.loglog(f, fitted, color=VERMILION, label="fitted")
-    for number, one in enumerate(e for e in identification.estimates if e.name.startswith("natural frequency")):
-        if f[0] <= one.value <= f[-1]:
+    for number, mode in enumerate(
+        estimate for estimate in identification.estimates if estimate.name.startswith("natural frequency")
+    ):
+        if f[0] <= mode.value <= f[-1]:
             name = "" if number else "natural frequencies"
-            ax.axvline(one.value, color=GREY, linewidth=0.6, linestyle=(0, (4, 2)), zorder=1.5, label=name)
+            ax.axvline(mode.value, color=GREY, linewidth=0.6, linestyle=(0, (4, 2)), zorder=1.5, label=name)
     ax.set_xlim(f[0], f[-1])
     number_logarithmic(ax.xaxis, *ax.get_xlim())
     ax.set_xlabel("Frequency [Hz]")
@@ -297,25 +305,40 @@ def draw_response(ax: Axes, identification: Identification) -> None:
     """
     curves = {name: np.asarray(values) for name, values in identification.curves.items()}
     f, coherence = curves["frequency_Hz"], curves["coherence"]
-    P = np.hypot(curves["real_m_per_N"], curves["imag_m_per_N"])
+    magnitude = np.hypot(curves["real_m_per_N"], curves["imag_m_per_N"])
     averages = float(identification.details["averages"])
     error = np.minimum(DISK * relative_error(np.maximum(coherence, 1e-6), averages), 0.9)
     sweep = curves.get("sweep", np.ones(len(f)))
     sweeps = np.unique(sweep)
-    for number, one in enumerate(sweeps):
+    for number, sweep_number in enumerate(sweeps):
         colour, dashes = LINES[number % len(LINES)]
-        name = f"sweep {one:g}" if len(sweeps) > 1 else "|P|"
-        ax.loglog(f[sweep == one], P[sweep == one], color=colour, linestyle=dashes, linewidth=1.1, label=name)
+        name = f"sweep {sweep_number:g}" if len(sweeps) > 1 else "|P|"
+        ax.loglog(
+            f[sweep == sweep_number],
+            magnitude[sweep == sweep_number],
+            color=colour,
+            linestyle=dashes,
+            linewidth=1.1,
+            label=name,
+        )
     first = sweep == sweeps[0]
-    ends = (P * (1.0 - error))[first], (P * (1.0 + error))[first]
+    ends = (magnitude * (1.0 - error))[first], (magnitude * (1.0 + error))[first]
     text = "95 % at each frequency" + (f", sweep {sweeps[0]:g}" if len(sweeps) > 1 else "")
     ax.fill_between(f[first], *ends, color=BLUE, alpha=0.25, linewidth=0.0, label=text)
     poor = coherence < COHERENT
     if poor.any():
         ax.plot(
-            f[poor], P[poor], color=VERMILION, marker="x", markersize=3.0, linestyle="none", label="not coherent"
+            f[poor],
+            magnitude[poor],
+            color=VERMILION,
+            marker="x",
+            markersize=3.0,
+            linestyle="none",
+            label="not coherent",
         )
-    seen = P[(P > 0.0) & ~poor] if np.any((P > 0.0) & ~poor) else P[P > 0.0]
+    seen = (
+        magnitude[(magnitude > 0.0) & ~poor] if np.any((magnitude > 0.0) & ~poor) else magnitude[magnitude > 0.0]
+    )
     if len(seen):
         ax.set_ylim(float(seen.min()) / BESIDE, float(seen.max()) * BESIDE)
     ax.set_xlim(float(np.min(f)), float(np.max(f)))
@@ -334,21 +357,21 @@ def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
     curves = {name: np.asarray(values) for name, values in result.curves.items()}
     drives = list(dict.fromkeys(curves["drive"].tolist()))
     for number, drive in enumerate(drives):
-        mine = curves["drive"] == drive
+        of_drive = curves["drive"] == drive
         name = f"{drive}, " if len(drives) > 1 else ""
         colour = COLOURS[number % len(COLOURS)] if len(drives) > 1 else BLUE
         for fitted, word in ((1.0, "fitted"), (0.0, "predicted")):
-            here = mine & (curves["fitted"] == fitted)
+            shown = of_drive & (curves["fitted"] == fitted)
             ax.scatter(
-                curves["angle_rad"][here],
-                curves["torque_Nm"][here],
+                curves["angle_rad"][shown],
+                curves["torque_Nm"][shown],
                 s=9.0,
                 facecolors=colour if fitted else "none",
                 edgecolors=colour,
                 linewidths=0.6,
                 label=f"{name}measured, {word}",
             )
-        _draw_spring(ax, curves, mine, "fitted spring and friction" if number == 0 else "")
+        _draw_spring(ax, curves, of_drive, "fitted spring and friction" if number == 0 else "")
     ax.axhline(0.0, color=GREY, linewidth=0.6)
     ax.axvline(0.0, color=GREY, linewidth=0.6)
     label(ax.xaxis, "Angle at the motor's shaft", "rad")
@@ -356,14 +379,14 @@ def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
     legend_above(ax, columns=3)
 
 
-def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], mine: np.ndarray, text: str) -> None:
+def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], of_drive: np.ndarray, text: str) -> None:
     """Draw the fitted torque [N m] along each stroke of one drive.
 
-    mine  (k,) which rows of the curves are of this drive
+    of_drive  (k,) which rows of the curves are of this drive
     """
-    turns = np.flatnonzero(np.diff(curves["motion"][mine])) + 1
-    angle, torque = curves["angle_rad"][mine], curves["fitted_torque_Nm"][mine]
-    for number, (first, behind) in enumerate(pairwise([0, *turns.tolist(), len(angle)])):
+    starts = np.flatnonzero(np.diff(curves["motion"][of_drive])) + 1
+    angle, torque = curves["angle_rad"][of_drive], curves["fitted_torque_Nm"][of_drive]
+    for number, (first, behind) in enumerate(pairwise([0, *starts.tolist(), len(angle)])):
         ax.plot(
             angle[first:behind], torque[first:behind], color=BLACK, linewidth=0.9, label="" if number else text
         )

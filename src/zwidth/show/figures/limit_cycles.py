@@ -52,10 +52,10 @@ def draw_balance(
         cycle, simulated = answer.cycle, answer.source == "simulation"
         kind = f"{'stable' if cycle.stable else 'unstable'} limit cycle{', simulated' if simulated else ''}"
         kind, color = (kind, VERMILION) if cycle.within_range else ("predicted beyond the range", GREY)
-        _mark(ax, cycle, kind, "s" if simulated else "o", color)
+        _mark_cycle(ax, cycle, kind, "s" if simulated else "o", color)
     replaced = [one.predicted for one in answers if one.source == "simulation" and one.predicted is not None]
     for cycle in (*replaced, *(one.cycle for one in contradicted)):
-        _mark(ax, cycle, "predicted, but simulated otherwise", "x", BLACK)
+        _mark_cycle(ax, cycle, "predicted, but simulated otherwise", "x", BLACK)
     ax.set_ylabel("Growth rate [1/s]")
     low, high = _amplitude_range(balance, cycles)
     ax.set_xlim(low, high)
@@ -71,8 +71,11 @@ def draw_balance(
     legend_above(ax)
 
 
-def _mark(ax: Axes, cycle: LimitCycle, kind: str, marker: str, color: str) -> None:
-    """A mark on the zero line at the amplitude of a limit cycle, full where it is stable, with its numbers."""
+def _mark_cycle(ax: Axes, cycle: LimitCycle, kind: str, marker: str, color: str) -> None:
+    """Draw a mark at the amplitude of a limit cycle on the line of no growth, full where it is stable.
+
+    kind  of limit cycle, in words of the legend, where its amplitude and frequency follow
+    """
     ax.plot(
         cycle.amplitude,
         0.0,
@@ -104,11 +107,13 @@ def _scale_growth(ax: Axes, visible: Floats, *, crossings: bool) -> None:
 
 
 def _amplitude_range(balance: HarmonicBalance, cycles: Sequence[LimitCycle]) -> tuple[float, float]:
-    """Smallest and largest amplitude that are drawn [m]."""
-    at, farthest = balance.amplitude, BEYOND * balance.largest_motion
+    """Smallest and largest amplitude that are drawn [m], by AROUND, the limit cycles, BEYOND, and the range."""
+    amplitude, farthest = balance.amplitude, BEYOND * balance.largest_motion
     amplitudes = [cycle.amplitude for cycle in cycles if cycle.within_range]
-    swings = at[np.isfinite(balance.growth)]
-    low, high = (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(at[0]), float(at[-1]))
+    swings = amplitude[np.isfinite(balance.growth)]
+    low, high = (
+        (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(amplitude[0]), float(amplitude[-1]))
+    )
     if amplitudes:
         low, high = max(low, min(amplitudes) / AROUND), min(high, AROUND * max(amplitudes))
     return (low, min(high, farthest)) if farthest > 2.0 * low else (low, high)
@@ -116,10 +121,13 @@ def _amplitude_range(balance: HarmonicBalance, cycles: Sequence[LimitCycle]) -> 
 
 def draw_plane(ax: Axes, device: DevicePlane) -> None:
     """The device's ray over wall stiffness, in the regions of viscous and dry friction, both axes logarithmic."""
+    # passive above and to the right of the corner: beta >= delay + 1/2 and sigma >= 1/2
     corner = device.delay + 0.5
     x, y = device.beta, device.sigma
     points = np.concatenate([x[x > 0.0], [corner]]), np.concatenate([y[y > 0.0], [0.5]])
-    (left, right), (low, high) = ((float(p.min()) / 3.0, float(p.max()) * 3.0) for p in points)
+    (left, right), (low, high) = (
+        (float(coordinates.min()) / 3.0, float(coordinates.max()) * 3.0) for coordinates in points
+    )
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.fill_between([corner, right], 0.5, high, color=STABLE, linewidth=0.0)

@@ -57,29 +57,29 @@ def load_path_figure(path: LoadPath, width: float = 7.6, height: float = 5.4) ->
 
     height  of a figure of two rows; in a single column a row is nearly as high [inches]
     """
-    close = [draw_close_up] if _spread(path) > VISIBLE else []
+    close = [draw_close_up] if _relative_spread(path) > VISIBLE else []
     growth = [draw_growth] if np.isfinite(path.growth_rates).any() else []
     columns = [[_draw_edges, *close], [draw_stiffness, *growth]]
     if width < NARROW:
         count = 2 + len(close) + len(growth)
         columns, height = [[*columns[0], *columns[1]]], 0.45 * count * height
     rows = max(map(len, columns))
-    made, first = figure(width, height if rows > 1 else LOW * height)
+    drawing, first = figure(width, height if rows > 1 else LOW * height)
     with context():
-        grid = made.add_gridspec(rows, len(columns))
+        grid = drawing.add_gridspec(rows, len(columns))
         panels: list[Axes] = []
         for n, column in enumerate(columns):
             for k, draw in enumerate(column):
                 place = grid[:, n] if len(column) == 1 else grid[k, n]
-                ax = made.add_subplot(place) if panels else first
+                ax = drawing.add_subplot(place) if panels else first
                 ax.set_subplotspec(place)
                 draw(ax, path)
                 panels.append(ax)
-        _bar(made, panels, path)
-    return made
+        _add_colour_bar(drawing, panels, path)
+    return drawing
 
 
-def _spread(path: LoadPath) -> float:
+def _relative_spread(path: LoadPath) -> float:
     """By what share of the largest the stiffest walls under the pushes differ; 0 without any."""
     stiffest = path.stiffness_max[np.isfinite(path.stiffness_max)]
     return float(np.ptp(stiffest) / stiffest.max()) if len(stiffest) else 0.0
@@ -89,7 +89,7 @@ def draw_outlines(ax: Axes, path: LoadPath) -> None:
     """The edges of the stable sets by the colour of the push, with the colours above."""
     _draw_edges(ax, path)
     assert ax.figure is not None
-    _bar(ax.figure, [ax], path)
+    _add_colour_bar(ax.figure, [ax], path)
 
 
 def _draw_edges(ax: Axes, path: LoadPath) -> None:
@@ -97,8 +97,8 @@ def _draw_edges(ax: Axes, path: LoadPath) -> None:
     drawn = [(step, step.chart) for step in path.steps if step.chart is not None and step.chart.regions]
     for step, chart in drawn:
         for ring in edges_of(chart.regions):
-            ax.plot(*ring.T, **_line(step, path))
-    frame(ax, _window([chart for _, chart in drawn]), empty=not drawn)
+            ax.plot(*ring.T, **_line_style(step, path))
+    frame(ax, _default_window([chart for _, chart in drawn]), empty=not drawn)
 
 
 def draw_close_up(ax: Axes, path: LoadPath) -> None:
@@ -114,12 +114,12 @@ def draw_close_up(ax: Axes, path: LoadPath) -> None:
     for step in path.steps:
         if step.chart is None:
             continue
-        for K, B in _curves(step.chart, window[0]):
-            ax.plot(K, B, **_line(step, path))
+        for K, B in _edge_pieces(step.chart, window[0]):
+            ax.plot(K, B, **_line_style(step, path))
             dampings.append(B[(window[0] <= K) & (B >= 0.0)])
-        if step.stiffness_max == step.stiffness_max:
-            at = step.chart.stiffness_max, step.chart.damping_at_stiffness_max
-            ax.plot(*at, marker="o", markersize=3.6, color=_colour(step, path), zorder=5.0)
+        if step.stiffness_max == step.stiffness_max:  # not nan
+            wall = step.chart.stiffness_max, step.chart.damping_at_stiffness_max
+            ax.plot(*wall, marker="o", markersize=3.6, color=_colour(step, path), zorder=5.0)
     seen = np.concatenate([np.zeros(0), *dampings])
     ax.set_xlim(*window)
     if len(seen):
@@ -137,7 +137,7 @@ def _few_ticks() -> Any:
     return MaxNLocator(nbins=4, steps=[1, 2, 5, 10])
 
 
-def _curves(chart: StabilityChart, low: float) -> Iterator[tuple[Floats, Floats]]:
+def _edge_pieces(chart: StabilityChart, low: float) -> Iterator[tuple[Floats, Floats]]:
     """Pieces of a chart's edge from its exact curve, (K [N/m], B [N s/m]), nan in K far below `low`."""
     tracer, hertz = tracer_of(chart.loop), 1.0 / (2.0 * pi * chart.loop.period)
     for arc in chart.boundary:
@@ -160,7 +160,7 @@ def draw_stiffness(ax: Axes, path: LoadPath) -> None:
     """The largest stiffness over the push, as a change from that without one where there is one: with the posture
     kept, without the change of the hand's force, and on a fixed surface."""
     free = path.unpushed.stiffness_max
-    relative = free == free
+    relative = free == free  # not nan
     if not np.isfinite(path.stiffness_max).any():
         draw_empty(ax)
         return
@@ -177,17 +177,21 @@ def draw_stiffness(ax: Axes, path: LoadPath) -> None:
     for n, (name, values, style) in enumerate(lines):
         if np.isfinite(values).any():
             ax.plot(path.pushes, shown(values), label=name, zorder=2.5 + 0.1 * n, **style)
-    _dots(ax, path, shown(path.stiffness_max))
+    _draw_dots(ax, path, shown(path.stiffness_max))
     title = "Largest stiffness"
     if relative:
         ax.set_ylabel("Change of stiffness [%]")
-        most = float(np.nanmax(np.abs(shown(path.stiffness_max))))
-        changes = f"changes by {percent(most / 100.0)} at most" if most > 100.0 * ROUNDING else "does not change"
+        largest_change = float(np.nanmax(np.abs(shown(path.stiffness_max))))
+        changes = (
+            f"changes by {percent(largest_change / 100.0)} at most"
+            if largest_change > 100.0 * ROUNDING
+            else "does not change"
+        )
         title += f", from {quantity(free, 'N/m')}\nwithout a push: {changes}"
-        _reach(ax, LEAST_CHANGE)
+        _widen_to(ax, LEAST_CHANGE)
     else:
         label(ax.yaxis, title, "N/m")
-    _over_push(ax, path, path.stiffness_max)
+    _finish_over_push(ax, path, path.stiffness_max)
     legend_above(ax, title=title)
 
 
@@ -199,26 +203,26 @@ def draw_growth(ax: Axes, path: LoadPath) -> None:
         draw_empty(ax, "no motion is free along the surface")
         return
     ax.plot(path.pushes, rates, color=BLACK, zorder=2.9)
-    _dots(ax, path, rates)
-    _reach(ax, LEAST_GROWTH)
-    _over_push(ax, path, rates)
+    _draw_dots(ax, path, rates)
+    _widen_to(ax, LEAST_GROWTH)
+    _finish_over_push(ax, path, rates)
 
 
-def _reach(ax: Axes, least: float) -> None:
+def _widen_to(ax: Axes, least: float) -> None:
     """Widen the upright axis to `least` on both sides of zero: what is less is next to nothing, and looks so."""
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -least), max(high, least))
 
 
-def _dots(ax: Axes, path: LoadPath, values: Floats) -> None:
+def _draw_dots(ax: Axes, path: LoadPath, values: Floats) -> None:
     """A dot for each push in its colour."""
     for step, value in zip(path.steps, values, strict=True):
         if np.isfinite(value):
             ax.plot(step.push, value, marker="o", markersize=4.4, color=_colour(step, path), zorder=4.0)
 
 
-def _over_push(ax: Axes, path: LoadPath, values: Floats) -> None:
-    """Name the axis of the push, and mark pushes without an answer by crosses at its foot.
+def _finish_over_push(ax: Axes, path: LoadPath, values: Floats) -> None:
+    """Set limits and name of the axis of the push, and mark pushes without an answer by crosses at its foot.
 
     values  (pushes,) nan: no answer
     """
@@ -237,7 +241,7 @@ def _over_push(ax: Axes, path: LoadPath, values: Floats) -> None:
 
 
 def _norm(path: LoadPath) -> BoundaryNorm:
-    """Norm that gives each push [N] a band of COLOURS."""
+    """Norm that gives each push [N] a band of COLOURS; the pushes are evenly spaced."""
     pushes = path.pushes
     half = 0.5 * (pushes[1] - pushes[0])
     return BoundaryNorm(np.append(pushes - half, pushes[-1] + half), COLOURS.N)
@@ -248,7 +252,7 @@ def _colour(step: PushedChart, path: LoadPath) -> Any:
     return COLOURS(_norm(path)(step.push))
 
 
-def _line(step: PushedChart, path: LoadPath) -> dict[str, Any]:
+def _line_style(step: PushedChart, path: LoadPath) -> dict[str, Any]:
     """The line style of one push: the weaker it is the farther in front; dashed against the direction."""
     style: dict[str, Any] = {"color": _colour(step, path), "linewidth": 1.1}
     style["zorder"] = 3.0 - abs(step.push) / (1.0 + 2.0 * float(path.pushes[-1]))
@@ -257,12 +261,12 @@ def _line(step: PushedChart, path: LoadPath) -> dict[str, Any]:
     return style | {"linestyle": (0, (4, 2))} if step.push < 0.0 else style
 
 
-def _bar(made: Any, axes: Sequence[Axes], path: LoadPath) -> None:
+def _add_colour_bar(drawing: Any, axes: Sequence[Axes], path: LoadPath) -> None:
     """Add the colours of the pushes above the axes, with a few of the pushes named."""
     middle = len(path.steps) // 2
-    every = -(-middle // (MOST_TICKS // 2))
-    ticks = [push for k, push in enumerate(path.pushes.tolist()) if (k - middle) % every == 0]
-    bar = made.colorbar(
+    stride = -(-middle // (MOST_TICKS // 2))  # rounded up: at most MOST_TICKS, counted from the middle
+    ticks = [push for k, push in enumerate(path.pushes.tolist()) if (k - middle) % stride == 0]
+    bar = drawing.colorbar(
         ScalarMappable(_norm(path), COLOURS),
         ax=axes,
         location="top",
@@ -278,13 +282,13 @@ def _bar(made: Any, axes: Sequence[Axes], path: LoadPath) -> None:
     bar.set_label(f"Push of the hand [{spoken_unit('N')}], lines of negative ones dashed", fontsize=8.0)
 
 
-def _window(charts: Sequence[StabilityChart]) -> Window:
-    """The box of all outlines' part with K >= 0 and B >= 0, and 5 %; of all of them where nothing lies there."""
+def _default_window(charts: Sequence[StabilityChart]) -> Window:
+    """KMIN, KMAX, BMIN, BMAX of all outlines' part with K, B >= 0, and 5 %; of all of it where none lies there."""
     rings = [ring for chart in charts for ring in chart.regions]
     if all(np.isnan(chart.stiffness_max) for chart in charts):
         return window_of(rings)
     points = np.vstack(rings)
-    K, B = np.maximum(points.max(axis=0), 0.0).tolist()
+    K1, B1 = np.maximum(points.max(axis=0), 0.0).tolist()
     low = np.minimum(points.min(axis=0), 0.0)
-    K0, B0 = max(float(low[0]), -0.04 * K), max(float(low[1]), -0.1 * B)
-    return K0 - 0.01 * K, 1.05 * K, B0 - 0.01 * B, 1.05 * B
+    K0, B0 = max(float(low[0]), -0.04 * K1), max(float(low[1]), -0.1 * B1)
+    return K0 - 0.01 * K1, 1.05 * K1, B0 - 0.01 * B1, 1.05 * B1

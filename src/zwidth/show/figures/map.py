@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from zwidth.study.workspace.common_area import CommonArea
 
 
-ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle
+ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes (k, 2) of the links, joints (j, 2), handle (2,)
 
 MARKS: Final = {
     SINGULAR: ("singular", "xxxx"),
@@ -83,7 +83,7 @@ def map_figure(
     area    requirements to lay over it
     """
     x, y = dataset["x_m"].values, dataset["y_m"].values
-    view = _view(x, y, _mechanism(dataset, device))
+    view = _view_limits(x, y, _projected_mechanism(dataset, device))
     ratio = (view[3] - view[2]) / (view[1] - view[0])
     width = 6.2 if ratio < 1.4 else 4.6
     lines = 1 + (len(area.requirements) + 1 if area is not None else 0)
@@ -109,20 +109,23 @@ def draw_map(
     outline = reach_outline(dataset, name)
     if (np.abs(values) <= LARGEST).any():
         drawn = values if outline is None else continued(values, dataset[f"{name}_status"].values)
-        _contours(ax, x, y, values, drawn, str(about["title"]), unit, faint=area is not None, outline=outline)
+        _draw_contours(ax, x, y, values, drawn, str(about["title"]), unit, faint=area is not None, outline=outline)
     elif not np.isnan(values).all():
-        handles += _infinite(ax, x, y, values, str(about["title"]))
+        handles += _fill_infinite(ax, x, y, values, str(about["title"]))
     handles += _status_hatches(ax, x, y, dataset[f"{name}_status"].values)
     handles += _direction_strokes(ax, dataset, f"{name}_direction")
     if area is not None:
         handles += draw_areas(ax, area)
-    mechanism = _mechanism(dataset, device)
+    mechanism = _projected_mechanism(dataset, device)
     if mechanism is not None:
         _draw_mechanism(ax, mechanism)
         if about["along"] and not isinstance(dataset.attrs["direction"], str):
-            _arrow(ax, mechanism, dataset)
+            _draw_rendered_direction(ax, mechanism, dataset)
     _frame(
-        ax, _view(x, y, mechanism), str(dataset["x_m"].attrs["long_name"]), str(dataset["y_m"].attrs["long_name"])
+        ax,
+        _view_limits(x, y, mechanism),
+        str(dataset["x_m"].attrs["long_name"]),
+        str(dataset["y_m"].attrs["long_name"]),
     )
     if handles:
         _add_legend(ax, handles, one_column=area is not None)
@@ -130,7 +133,7 @@ def draw_map(
 
 def _add_legend(ax: Axes, handles: list[Any], *, one_column: bool) -> None:
     """Add the legend of these handles above the axes."""
-    made = ax.legend(
+    legend = ax.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.02),
@@ -143,10 +146,10 @@ def _add_legend(ax: Axes, handles: list[Any], *, one_column: bool) -> None:
         frameon=False,
         alignment="left",
     )
-    made.set_zorder(6.0)
+    legend.set_zorder(6.0)
 
 
-def _contours(
+def _draw_contours(
     ax: Axes,
     x: Floats,
     y: Floats,
@@ -165,13 +168,16 @@ def _contours(
     """
     levels, norm, colours = bands_of(values, faint=faint)
     extend: Any = norm.extend
-    most = 2.0 * max(float(np.abs(values[np.abs(values) <= LARGEST]).max()), *np.abs(levels[[0, -1]]).tolist())
-    z = np.ma.masked_invalid(np.clip(drawn, -most, most))
-    bands = ax.contourf(
-        x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0
+    # infinite values are drawn as twice the largest finite one, beyond every level
+    beyond_all = 2.0 * max(
+        float(np.abs(values[np.abs(values) <= LARGEST]).max()), *np.abs(levels[[0, -1]]).tolist()
     )
-    lines = ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
-    if paths := _paths(outline) if outline is not None else []:
+    heights = np.ma.masked_invalid(np.clip(drawn, -beyond_all, beyond_all))
+    bands = ax.contourf(
+        x, y, heights, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0
+    )
+    lines = ax.contour(x, y, heights, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
+    if paths := _outline_paths(outline) if outline is not None else []:
         edge = PathPatch(
             Path.make_compound_path(*paths), facecolor="none", edgecolor=GREY, linewidth=0.6, zorder=1.2
         )
@@ -181,10 +187,13 @@ def _contours(
     colour_bar(ax, levels, norm, colours, title, unit)
 
 
-def _infinite(ax: Axes, x: Floats, y: Floats, values: Floats, title: str) -> list[Any]:
-    """Fill where values are infinite with one colour: with none finite there is nothing to make levels of."""
-    z = np.ma.masked_array(np.ones(values.shape), np.isnan(values))
-    ax.contourf(x, y, z, levels=[0.0, 2.0], colors=[INFINITE_COLOUR], corner_mask=True, zorder=1.0)
+def _fill_infinite(ax: Axes, x: Floats, y: Floats, values: Floats, title: str) -> list[Any]:
+    """Fill where values are infinite with one colour: with none finite there is nothing to make levels of.
+
+    Returns  the legend's entry
+    """
+    ones = np.ma.masked_array(np.ones(values.shape), np.isnan(values))
+    ax.contourf(x, y, ones, levels=[0.0, 2.0], colors=[INFINITE_COLOUR], corner_mask=True, zorder=1.0)
     return [Patch(facecolor=INFINITE_COLOUR, label=f"{title}: infinite")]
 
 
@@ -193,9 +202,9 @@ def _status_hatches(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -
     handles: list[Any] = []
     with_hatches: dict[str, Any] = {"colors": "none", "zorder": 1.5}
     for kind, (text, hatch) in MARKS.items():
-        here = (status == kind).astype(float)
-        if here.any():
-            drawn = ax.contourf(x, y, here, levels=[0.5, 1.5], hatches=[hatch], **with_hatches)
+        has_status = (status == kind).astype(float)
+        if has_status.any():
+            drawn = ax.contourf(x, y, has_status, levels=[0.5, 1.5], hatches=[hatch], **with_hatches)
             drawn.set_edgecolor(GREY)
             drawn.set_linewidth(0.0)
             handles.append(Patch(facecolor="white", edgecolor=GREY, hatch=hatch, linewidth=0.5, label=text))
@@ -209,9 +218,9 @@ def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
     x, y = dataset["x_m"].values, dataset["y_m"].values
     apart = max(float(np.ptp(x)), float(np.ptp(y))) / ARROWS
     columns, rows = _spaced_indices(x, apart), _spaced_indices(y, apart)
-    u = dataset[name].values[np.ix_(rows, columns)]
-    axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
-    on_plane = u @ axes.T
+    directions = dataset[name].values[np.ix_(rows, columns)]
+    axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)  # unit vectors of the plane
+    on_plane = directions @ axes.T
     length = 0.36 * apart
     middle = np.stack(np.meshgrid(x[columns], y[rows]), axis=-1)
     keep = np.isfinite(on_plane).all(axis=-1)
@@ -246,7 +255,7 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
         bound = as_written(requirement.value, unit)
         text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
         style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
-        for path in _paths(region.shape):
+        for path in _outline_paths(region.shape):
             # hatches take the edge's colour: once for them, faint, and once for the outline
             ax.add_patch(
                 PathPatch(path, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.0, alpha=0.45)
@@ -254,7 +263,7 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
             ax.add_patch(PathPatch(path, zorder=2.2, **style))
         handles.append(Patch(hatch=hatch, label=text, **style))
     dotted: dict[str, Any] = {"linestyle": (0, (0.1, 1.6)), "linewidth": 3.2}
-    for path in _paths(area.common.shape):
+    for path in _outline_paths(area.common.shape):
         ax.add_patch(PathPatch(path, facecolor="none", edgecolor=BLACK, zorder=2.6, capstyle="round", **dotted))
     share = f"{percent(area.common.share)} of the reachable area"
     text = f"Common area: {area_text(area.common.area)}, {share}"
@@ -262,7 +271,7 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
     return handles
 
 
-def _paths(shape: Any) -> list[Path]:
+def _outline_paths(shape: Any) -> list[Path]:
     """The outlines of a shapely geometry's polygons, holes and all."""
     paths = []
     for part in getattr(shape, "geoms", [shape]):
@@ -273,7 +282,7 @@ def _paths(shape: Any) -> list[Path]:
     return paths
 
 
-def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism | None:
+def _projected_mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism | None:
     """The mechanism in its reference posture, projected on the plane; None where it has none, or is not drawn."""
     if device is None or device.mechanism is None:
         return None
@@ -304,8 +313,8 @@ def _draw_mechanism(ax: Axes, mechanism: ProjectedMechanism) -> None:
     ax.plot(*handle[:, None], linestyle="none", zorder=3.2, **square)
 
 
-def _arrow(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None:
-    """Along the rendered direction, from the handle; none where it points at the viewer."""
+def _draw_rendered_direction(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None:
+    """Draw an arrow along the rendered direction, from the handle; none where it points at the viewer."""
     strokes, _, handle = mechanism
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
     on_plane = axes @ np.asarray(dataset.attrs["direction"], dtype=float)
@@ -316,8 +325,8 @@ def _arrow(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None
     ax.annotate("", xy=tuple(handle + size * on_plane), xytext=tuple(handle), arrowprops=look, zorder=3.3)
 
 
-def _view(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[float, ...]:
-    """What a map's figure shows, the map and the mechanism: x and y, from and to [m]."""
+def _view_limits(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[float, ...]:
+    """XMIN, XMAX, YMIN, YMAX [m] of what a map's figure shows: the map and the mechanism."""
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
     if mechanism is not None:
         points = np.vstack([*mechanism[0], mechanism[1], mechanism[2][None]])
@@ -341,12 +350,12 @@ def draw_safe_walls(ax: Axes, table: SafeWalls) -> None:
     if not (table.level > 0).any():
         draw_empty(ax, "no cell has safe walls")
     elif table.grid.dimensions == 0:
-        _bands(ax, table)
+        _draw_bands(ax, table)
     else:
-        _cells(ax, table)
+        _draw_cells(ax, table)
 
 
-def _cells(ax: Axes, table: SafeWalls) -> None:
+def _draw_cells(ax: Axes, table: SafeWalls) -> None:
     """Draw the largest stiffness of each cell, of a table with a workspace; of cells in space the middle layer."""
     grid = table.grid
     K, status = table.rectangles[:, 0].reshape(grid.counts[::-1]), table.status.reshape(grid.counts[::-1])
@@ -372,7 +381,10 @@ def _cells(ax: Axes, table: SafeWalls) -> None:
 
 
 def hatch_cells(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[int]:
-    """Hatch the cells between these edges that have no value. Returns the statuses that are hatched."""
+    """Hatch the cells that have no value. Returns the statuses that are hatched.
+
+    x, y  (n + 1,), (m + 1,) borders of the cells;   status  (m, n)
+    """
     marked = [kind for kind in HATCH_OF if (status == kind).any()]
     for kind in marked:
         here = np.ma.masked_where(status != kind, np.ones(status.shape))
@@ -387,19 +399,24 @@ def status_patch(status: int) -> Patch:
     return Patch(hatch=HATCH_OF[status], label=STATUS[status], **look)
 
 
-def _bands(ax: Axes, table: SafeWalls) -> None:
-    """The safe walls as steps, a band of stiffness each, and within them the rectangle that the program gives."""
+def _draw_bands(ax: Axes, table: SafeWalls) -> None:
+    """The safe walls as steps, a band of stiffness each, and within them the rectangle that the program gives.
+
+    Of a table without a workspace, with its only cell 0 and its only table of directions, 0
+    """
     bands = [table.stiffness_of_level(0, 0, level) for level in range(table.levels + 1)]
     low, high = table.ranges[0, 0].T
-    some = low <= high
-    steps: dict[str, Any] = {"baseline": np.where(some, low, np.nan), "facecolor": STABLE, "edgecolor": BLACK}
+    has_walls = low <= high  # else the band has no safe damping
+    steps: dict[str, Any] = {"baseline": np.where(has_walls, low, np.nan), "facecolor": STABLE, "edgecolor": BLACK}
     text = "safe walls, by band of stiffness"
-    ax.stairs(np.where(some, high, np.nan), bands, fill=True, linewidth=0.8, label=text, **steps)
-    one = table.rectangle(0)
-    low_text, high_text = quantity(one.low, "N s/m"), quantity(one.high, "N s/m")
-    text = f"K up to {quantity(one.stiffness, 'N/m')}, B from {low_text} to {high_text}"
-    size = one.stiffness, one.high - one.low
-    ax.add_patch(Rectangle((0.0, one.low), *size, fill=False, edgecolor=VERMILION, linewidth=1.6, label=text))
+    ax.stairs(np.where(has_walls, high, np.nan), bands, fill=True, linewidth=0.8, label=text, **steps)
+    rectangle = table.rectangle(0)
+    low_text, high_text = quantity(rectangle.low, "N s/m"), quantity(rectangle.high, "N s/m")
+    text = f"K up to {quantity(rectangle.stiffness, 'N/m')}, B from {low_text} to {high_text}"
+    size = rectangle.stiffness, rectangle.high - rectangle.low
+    ax.add_patch(
+        Rectangle((0.0, rectangle.low), *size, fill=False, edgecolor=VERMILION, linewidth=1.6, label=text)
+    )
     ax.set_xlim(0.0, 1.05 * bands[-1])
     ax.set_ylim(bottom=0.0)
     label(ax.xaxis, "Virtual stiffness K", "N/m")

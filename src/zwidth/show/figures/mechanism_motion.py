@@ -66,14 +66,14 @@ LINK_COLOURS: Final = tuple(colour for colour, _ in LINES if colour != VERMILION
 
 def mechanism_motion_figure() -> tuple[Figure, list[Axes]]:
     """A figure with the five panels of `draw_mechanism_motion`: two drawings, and three courses beside them."""
-    made, first = figure(9.6, 7.6)
+    drawing, first = figure(9.6, 7.6)
     with context():
-        grid = made.add_gridspec(6, 2, width_ratios=(1.0, 1.1))
+        grid = drawing.add_gridspec(6, 2, width_ratios=(1.0, 1.1))
         first.set_subplotspec(grid[:3, 0])
-        close = made.add_subplot(grid[3:, 0])
-        depth = made.add_subplot(grid[:2, 1])
-        rest = [made.add_subplot(grid[row : row + 2, 1], sharex=depth) for row in (2, 4)]
-    return made, [first, close, depth, *rest]
+        close = drawing.add_subplot(grid[3:, 0])
+        depth = drawing.add_subplot(grid[:2, 1])
+        below = [drawing.add_subplot(grid[row : row + 2, 1], sharex=depth) for row in (2, 4)]
+    return drawing, [first, close, depth, *below]
 
 
 def draw_mechanism_motion(axes: Sequence[Axes], motion: MechanismMotion) -> None:
@@ -98,8 +98,8 @@ def draw_mechanism_motion(axes: Sequence[Axes], motion: MechanismMotion) -> None
 def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
     """Draw the mechanism at the start and, lighter, at the end, the path, and the surface; all of it in view."""
     mechanism, posture = motion.mechanism, motion.start
-    last = _last(motion)
-    poses = [posture] if last is None else [posture, last]
+    end = _last_posture(motion)
+    poses = [posture] if end is None else [posture, end]
     strokes = [_strokes(mechanism, pose) for pose in poses]
     flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes[0], motion.position]))
     for faint, pose, lines in zip((False, True), poses, strokes, strict=False):
@@ -108,8 +108,8 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
     points = np.vstack([np.zeros((1, 3)), *(stroke for lines in strokes for stroke in lines), motion.position])
     projection = points[:, flat]
     size = max(float(np.max(np.ptp(projection, axis=0))), 1e-9)
-    own = _bounds(motion.surface, size)
-    view = _view(projection if own is None else np.vstack([projection, own[:, flat]]), size * LEAST)
+    corners = _surface_corners(motion.surface, size)
+    view = _view_around(projection if corners is None else np.vstack([projection, corners[:, flat]]), size * LEAST)
     _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
     legend_above(ax, columns=4)
@@ -118,6 +118,7 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
 def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
     """The path alone, with where the computer sees the handle; or why there is none."""
     strokes = _strokes(motion.mechanism, motion.start)
+    # the two coordinates that are shown
     flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))
     size = float(np.max(np.ptp(np.vstack(strokes), axis=0)))
     mark: dict[str, Any] = {"linestyle": "none", "markersize": 7.0, "markeredgecolor": BLACK, "zorder": 5.0}
@@ -125,7 +126,7 @@ def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
         place = motion.start.position[None, flat]
         ax.plot(*place.T, marker="o", markerfacecolor="white", label="start", **mark)
         ax.set_title("\n".join(wrap(motion.reason, TITLE)), fontsize=8.0, loc="left")
-        _frame(ax, _view(place, size), flat)
+        _frame(ax, _view_around(place, size), flat)
         return
     true, readings = motion.position[:, flat], motion.counted_position[:, flat]
     if np.max(np.abs(true - readings)) > VISIBLE * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
@@ -133,13 +134,13 @@ def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
     ax.plot(*true.T, color=VERMILION, linewidth=1.3, label="path", zorder=4.0)
     ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
     ax.plot(*true[-1][:, None], marker="s", markerfacecolor=BLACK, label="end", **mark)
-    view = _view(true, size * LEAST)
+    view = _view_around(true, size * LEAST)
     _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
     legend_above(ax, columns=5)
 
 
-def _last(motion: MechanismMotion) -> Posture | None:
+def _last_posture(motion: MechanismMotion) -> Posture | None:
     """The posture at the end; None where it is not found again, as next to a singularity."""
     mechanism = motion.mechanism
     try:
@@ -147,6 +148,7 @@ def _last(motion: MechanismMotion) -> Posture | None:
     except PostureError:
         return None
     turned = posture.angles[mechanism.drives.joint] - motion.joints[-1]
+    # the same posture may be found with a drive turned by whole turns
     off = np.abs(turned - 2.0 * np.pi * np.round(turned / (2.0 * np.pi)))
     return posture if np.max(off) < NEAR else None
 
@@ -172,25 +174,28 @@ def _draw_posture(
         ax.plot(*stroke[:, flat].T, color=colour, linewidth=width, alpha=0.35 * strength, zorder=2.0 - faint)
         style: dict[str, Any] = {"color": colour, "linewidth": 1.2, "alpha": strength, "zorder": 2.1 - faint}
         ax.plot(*stroke[:, flat].T, label=named if n == 0 else "", **style)
-    at = joint_points(mechanism, link_points(mechanism, posture))[:, flat]
+    joints = joint_points(mechanism, link_points(mechanism, posture))[:, flat]
     circle: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none", "markeredgecolor": BLACK}
-    ax.plot(*at.T, markerfacecolor="white", alpha=strength, zorder=3.0 - faint, **circle)
+    ax.plot(*joints.T, markerfacecolor="white", alpha=strength, zorder=3.0 - faint, **circle)
 
 
-def _cut(motion: MechanismMotion, flat: list[int]) -> tuple[int, float]:
+def _cut_plane(motion: MechanismMotion, flat: list[int]) -> tuple[int, float]:
     """The axis 0, 1 or 2 that is looked along, and the place on it [m] where the handle is deepest."""
     across = ({0, 1, 2} - set(flat)).pop()
     return across, float(motion.position[int(np.argmax(motion.depth)), across])
 
 
-def _where(motion: MechanismMotion, cut: tuple[int, float]) -> str:
-    """Where the surface is cut, in words; "" for a path that stays there."""
+def _cut_text(motion: MechanismMotion, cut: tuple[int, float]) -> str:
+    """Where the surface is cut, in words; "" for a path that stays there.
+
+    cut  axis and place, as `_cut_plane` returns them
+    """
     across, place = cut
     moves = np.ptp(motion.position[:, across]) > NEAR * max(float(np.max(np.abs(motion.position))), 1e-12)
     return f" at {AXES[across]} = {quantity(place, 'm')}" if moves else ""
 
 
-def _bounds(surface: Surface | None, size: float) -> Floats | None:
+def _surface_corners(surface: Surface | None, size: float) -> Floats | None:
     """Two opposite corners (2, 3) [m] of a surface smaller than `size` [m]; None for others, and for a plane."""
     match surface:
         case Sphere():
@@ -204,7 +209,7 @@ def _bounds(surface: Surface | None, size: float) -> Floats | None:
     return np.array([middle - half, middle + half]) if np.max(half) < size else None
 
 
-def _view(points: Floats, least: float) -> Floats:
+def _view_around(points: Floats, least: float) -> Floats:
     """Corners (2, 2) of a rectangle round the points (k, 2), with some room, and not smaller than `least` [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, least)
@@ -228,9 +233,9 @@ def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMoti
     """Shade the wall and draw its edge, cut at one place of the axis that is looked along."""
     if motion.surface is None:
         return
-    cut = _cut(motion, flat)
-    more = FILLED * np.max(view[1] - view[0])
-    x, y = np.linspace(view[0] - more, view[1] + more, GRID).T
+    cut = _cut_plane(motion, flat)
+    margin = FILLED * np.max(view[1] - view[0])
+    x, y = np.linspace(view[0] - margin, view[1] + margin, GRID).T
     points = np.empty((GRID, GRID, 3))
     points[..., flat[0]], points[..., flat[1]], points[..., cut[0]] = x[None, :], y[:, None], cut[1]
     depth = depth_and_normal(motion.surface, points)[0]
@@ -241,11 +246,14 @@ def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMoti
         ax.contourf(x, y, depth, levels=[0.0, np.inf], colors=[WALL], zorder=0.5)
     if depth.min() < 0.0 < depth.max():
         ax.contour(x, y, depth, levels=[0.0], colors=[GREY], linewidths=1.2, zorder=0.7)
-    ax.plot([], [], color=GREY, linewidth=1.2, label=name + _where(motion, cut))
+    ax.plot([], [], color=GREY, linewidth=1.2, label=name + _cut_text(motion, cut))
 
 
 def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) -> None:
-    """Draw depth [m] and force [N] over time; without a surface both panels are hidden."""
+    """Draw depth [m] and force [N] over time; without a surface both panels are hidden.
+
+    draw  `draw_line` or `draw_envelope`
+    """
     label(depth.yaxis, "Depth", "m")
     label(force.yaxis, "Force", "N")
     if motion.surface is None:
@@ -258,7 +266,10 @@ def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) 
 
 
 def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
-    """Draw the energy of motion and of bent drives, and what the others have put in, where it is worth a line."""
+    """Draw the energy of motion and of bent drives, and what gravity, hand, motors and friction have put in [J].
+
+    Each over time, where it is worth a line;   draw  `draw_line` or `draw_envelope`
+    """
     courses = {
         "kinetic": motion.kinetic,
         "drives, elastic": motion.elastic,
@@ -268,7 +279,7 @@ def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
         "dry friction": -motion.friction_loss,
     }
     sizes = {name: float(np.max(np.abs(values))) for name, values in courses.items()}
-    largest = max(size for size in sizes.values() if size == size)
+    largest = max(size for size in sizes.values() if size == size)  # not nan
     for (name, values), (colour, dashes) in zip(courses.items(), LINES, strict=True):
         if sizes[name] > WORTH * largest:
             draw(ax, motion.time, values, colour, name, dashes=dashes)
@@ -303,10 +314,10 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
     view = np.eye(3)[flat] if planar else OBLIQUE
     size = max(float(np.max(np.ptp(everything @ view.T, axis=0))), 1e-9)
-    for stroke, name, n, first in zip(strokes, scene.names, scene.styles, scene.first, strict=True):
-        _link(ax, stroke @ view.T, name if first else "", n)
-    _joints(ax, scene, view, size, [stroke @ view.T for stroke in strokes])
-    _handle(ax, view @ posture.position, np.asarray(direction, dtype=float), view, size)
+    for stroke, name, style, first in zip(strokes, scene.names, scene.styles, scene.first, strict=True):
+        _draw_link(ax, stroke @ view.T, name if first else "", style)
+    _draw_joints(ax, scene, view, size, [stroke @ view.T for stroke in strokes])
+    _draw_handle(ax, view @ posture.position, np.asarray(direction, dtype=float), view, size)
     ax.set_aspect("equal")
     ax.margins(0.12, 0.06)
     ax.autoscale_view()
@@ -316,12 +327,15 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
         for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
             label(axis, AXES[k], "m", plain=True)
     else:
-        _base_axes(ax, everything @ view.T, size)
+        _draw_base_axes(ax, everything @ view.T, size)
     legend_beside(ax)
 
 
-def _base_axes(ax: Axes, points: Floats, size: float) -> None:
-    """The directions of x, y and z in a corner, and a length to measure by; an oblique view has no scales."""
+def _draw_base_axes(ax: Axes, points: Floats, size: float) -> None:
+    """Draw the directions of x, y and z in a corner, as a length to measure by; an oblique view has no scales.
+
+    points  (k, 2) of all that is drawn, and `size`, their largest extent, in the picture [m]
+    """
     length = 10.0 ** np.floor(np.log10(0.4 * size))
     length *= next(step for step in (5.0, 2.0, 1.0) if step * length <= 0.4 * size)
     corner = points.min(axis=0) - np.array([0.2, 0.12]) * size
@@ -338,19 +352,20 @@ def _base_axes(ax: Axes, points: Floats, size: float) -> None:
         fontsize=8.0,
         color=BLACK,
     )
+    # an empty line widens the view by the room of the text
     ax.plot(*(corner - np.array([0.0, 0.12 * size]))[:, None], linestyle="none", marker=None)
     ax.axis("off")
 
 
-def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
-    """Draw one link, (k, 2) in the picture, in the n-th of the line styles."""
-    colour = LINES[n % len(LINES)][0]
-    style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 2.0}
-    ax.plot(*stroke.T, color=colour, linewidth=5.0, alpha=0.35, **style)
-    ax.plot(*stroke.T, color=colour, linestyle=LINES[n % len(LINES)][1], linewidth=1.2, label=name, zorder=2.1)
+def _draw_link(ax: Axes, stroke: Floats, name: str, style: int) -> None:
+    """Draw one link, a stroke (k, 2) in the picture, in the line style of this number; named in the legend."""
+    colour = LINES[style % len(LINES)][0]
+    look: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 2.0}
+    ax.plot(*stroke.T, color=colour, linewidth=5.0, alpha=0.35, **look)
+    ax.plot(*stroke.T, color=colour, linestyle=LINES[style % len(LINES)][1], linewidth=1.2, label=name, zorder=2.1)
 
 
-def _joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes: list[Floats]) -> None:
+def _draw_joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes: list[Floats]) -> None:
     """Draw base, joints and loop closures; driven joints filled, with the names of their drives.
 
     view     (2, 3) from the base frame to the picture;   size  of the picture [m]
@@ -389,13 +404,15 @@ def _joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes:
 
 
 def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
-    """Unit vector (2,) into the middle of the widest gap between the lines that end at a place; right without
-    any."""
-    angles = []
+    """Unit vector (2,) from a place into the widest gap between the lines that end there; right without any.
+
+    strokes  (k, 2) of each link in the picture;   near  distance below which two points are one
+    """
+    angles = []  # in which lines leave the place
     for stroke in strokes:
         for a, b in pairwise(stroke):
             angles += [
-                float(np.arctan2(*(to - start)[::-1]))
+                float(np.arctan2(*(to - start)[::-1]))  # of y and x
                 for start, to in ((a, b), (b, a))
                 if np.linalg.norm(start - place) <= near < np.linalg.norm(to - start)
             ]
@@ -407,22 +424,28 @@ def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
 
 
 def _labels_by_position(points: Floats, names: tuple[str, ...], near: float) -> list[tuple[Floats, list[str]]]:
-    """Names gathered by place, so that labels of joints in one place stand under each other."""
+    """Each place of the points (k, 2), with the names of those closer to it than `near`.
+
+    Labels of joints in one place then stand under each other.
+    """
     groups: list[tuple[Floats, list[str]]] = []
     for point, name in zip(points, names, strict=True):
-        for place, others in groups:
+        for place, names_here in groups:
             if np.linalg.norm(place - point) <= near:
-                others.append(name)
+                names_here.append(name)
                 break
         else:
             groups.append((point, [name]))
     return groups
 
 
-def _handle(ax: Axes, handle: Floats, direction: Floats, view: Floats, size: float) -> None:
+def _draw_handle(ax: Axes, handle: Floats, direction: Floats, view: Floats, size: float) -> None:
     """Draw the handle, and an arrow along the rendered direction or the axis of moments.
 
-    A ring where it points at the viewer.   view  (2, 3) from the base frame to the picture;   size  of it [m]
+    A ring where it points at the viewer.
+
+    handle     (2,) in the picture;   direction  (3,), or a screw (6,), in the base frame
+    view       (2, 3) from the base frame to the picture;   size  of the picture [m]
     """
     turns = len(direction) == 6 and not direction[:3].any()
     along = view @ (direction[3:] if turns else direction[:3])
@@ -459,33 +482,33 @@ WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height 
 
 def draw_chain(ax: Axes, plant: Plant, chain: MassChain) -> None:
     """Masses as boxes with their numbers, springs over dampers, and where the wall acts, reads and is held."""
-    n = len(chain.mass)
-    left = GAP * (np.arange(n) + 1.0) + WIDTH * np.arange(n)
-    for i, x in enumerate(left):
+    count = len(chain.mass)
+    left = GAP * (np.arange(count) + 1.0) + WIDTH * np.arange(count)
+    for k, x in enumerate(left):
         ax.add_patch(Rectangle((x, -HALF), WIDTH, 2 * HALF, facecolor="#EEEEEE", edgecolor=BLACK))
-        ax.text(x + WIDTH / 2, 0.0, as_written(float(chain.mass[i]), "kg"), ha="center", va="center", fontsize=8.0)
-        ax.text(x + WIDTH / 2, -HALF - 0.12, "\n".join(_roles(plant, i)), ha="center", va="top", fontsize=8.0)
-    for i in range(n + 1):
-        start = left[i] - GAP if i < n else left[-1] + WIDTH
-        if chain.stiffness[i] > 0.0 or chain.damping[i] > 0.0:
-            _spring_and_damper(ax, start, start + GAP, float(chain.stiffness[i]), float(chain.damping[i]))
-            if i in (0, n):
-                _ground(ax, start if i == 0 else start + GAP)
-    ends = chain.stiffness[[0, n]] + chain.damping[[0, n]] > 0.0
+        ax.text(x + WIDTH / 2, 0.0, as_written(float(chain.mass[k]), "kg"), ha="center", va="center", fontsize=8.0)
+        ax.text(x + WIDTH / 2, -HALF - 0.12, "\n".join(_roles(plant, k)), ha="center", va="top", fontsize=8.0)
+    for k in range(count + 1):
+        start = left[k] - GAP if k < count else left[-1] + WIDTH
+        if chain.stiffness[k] > 0.0 or chain.damping[k] > 0.0:
+            _draw_spring_and_damper(ax, start, start + GAP, float(chain.stiffness[k]), float(chain.damping[k]))
+            if k in (0, count):
+                _draw_ground(ax, start if k == 0 else start + GAP)
+    ends = chain.stiffness[[0, count]] + chain.damping[[0, count]] > 0.0
     ax.set_xlim(left[0] - GAP * ends[0] - 0.3, left[-1] + WIDTH + GAP * ends[1] + 0.3)
     ax.set_ylim(-HALF - 1.0, HALF + 0.7)
     ax.set_aspect("equal")
     ax.set_axis_off()
 
 
-def _roles(plant: Plant, i: int) -> list[str]:
-    """What the i-th mass is: where the wall acts, where the encoder reads, where the hand holds."""
+def _roles(plant: Plant, mass: int) -> list[str]:
+    """What the mass of this number is: where the wall acts, where the encoder reads, where the hand holds."""
     handle = plant.handle if plant.handle is not None else np.zeros(plant.size)
     names = (("wall acts", plant.actuator), ("encoder", plant.sensor), ("handle", handle))
-    return [name for name, vector in names if vector[i] != 0.0]
+    return [name for name, vector in names if vector[mass] != 0.0]
 
 
-def _spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, damping: float) -> None:
+def _draw_spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, damping: float) -> None:
     """Draw a spring [N/m] over a damper [N s/m], or either alone, between two places of the picture."""
     both = stiffness > 0.0 and damping > 0.0
     if stiffness > 0.0:
@@ -506,6 +529,6 @@ def _spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, dam
         ax.text(middle, y - 0.27, as_written(damping, "N s/m"), ha="center", va="top", fontsize=8.0)
 
 
-def _ground(ax: Axes, x: float) -> None:
+def _draw_ground(ax: Axes, x: float) -> None:
     """Draw the ground, an upright line."""
     ax.plot([x, x], [-HALF, HALF], color=BLACK, linewidth=2.0)

@@ -34,17 +34,17 @@ def front_figure(found: Optimisation, width: float = 5.6, height: float = 3.9) -
     """A figure of the front, with a panel for each pair of the first objectives."""
     pairs = list(combinations(range(len(found.problem.objectives)), 2))[:MOST_PANELS]
     if len(pairs) < 2:
-        made, ax = figure(width, height)
+        drawing, ax = figure(width, height)
         with context():
             draw_optimisation(ax, found)
-        return made
-    made, first = figure(width, 0.9 * height * len(pairs))
+        return drawing
+    drawing, first = figure(width, 0.9 * height * len(pairs))
     with context():
         first.remove()
-        panels = made.subplots(len(pairs), 1)
+        panels = drawing.subplots(len(pairs), 1)
         for n, (ax, (i, j)) in enumerate(zip(panels, pairs, strict=True)):
             _draw_pair(ax, found, i, j, legend=n == 0)
-    return made
+    return drawing
 
 
 def draw_optimisation(ax: Axes, found: Optimisation) -> None:
@@ -77,12 +77,12 @@ def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -
         _draw_bars(ax, front, found.bars.low[:, columns], found.bars.high[:, columns])
     if knee is not None:
         ax.plot(*front[knee], "D", color=VERMILION, markersize=7.0, label="knee", zorder=4)
-    if found.baseline is not None and not np.isnan(own := found.baseline.values[0, columns]).any():
-        near = ((own >= low - 4.0 * room) & (own <= high + 4.0 * room)).all()
+    if found.baseline is not None and not np.isnan(baseline := found.baseline.values[0, columns]).any():
+        near = ((baseline >= low - 4.0 * room) & (baseline <= high + 4.0 * room)).all()
         if near:
-            ax.plot(*own, "s", color=GREEN, markersize=6.0, label="the device as it is", zorder=4)
+            ax.plot(*baseline, "s", color=GREEN, markersize=6.0, label="the device as it is", zorder=4)
     for axis, column in zip((ax.xaxis, ax.yaxis), columns, strict=True):
-        _name(axis, problem.columns[column])
+        _name_axis(axis, problem.columns[column])
     if legend:
         legend_above(ax, 4)
 
@@ -117,16 +117,16 @@ def _draw_approach(ax: Axes, found: Optimisation) -> None:
     ax.step(tried[known], best[known], where="post", color=BLUE, label="best found so far")
     if found.polished:
         ax.axvline(found.searched, color=GREY, linestyle=":", linewidth=1.0, label="polish begins")
-    if found.baseline is not None and np.isfinite(own := found.baseline.values[0, objective.column]):
-        ax.axhline(own, color=GREEN, linestyle=(0, (5, 1.5)), label="the device as it is")
+    if found.baseline is not None and np.isfinite(baseline := found.baseline.values[0, objective.column]):
+        ax.axhline(baseline, color=GREEN, linestyle=(0, (5, 1.5)), label="the device as it is")
     ax.set_xlabel("Designs tried")
-    _name(ax.yaxis, problem.columns[objective.column])
+    _name_axis(ax.yaxis, problem.columns[objective.column])
     legend_above(ax, 3)
 
 
-def _name(axis: Axis, one: Column) -> None:
+def _name_axis(axis: Axis, column: Column) -> None:
     """Name an axis by a column, in its unit if it has one."""
-    if one.unit:
-        label(axis, one.title, one.unit)
+    if column.unit:
+        label(axis, column.title, column.unit)
     else:
-        axis.set_label_text(one.title)
+        axis.set_label_text(column.title)

@@ -38,30 +38,30 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
     Raises  TypeError  for what has no drawing
     """
     draw = drawing_of(result)
-    with speaking_of_moments(_turns(result)):
+    with speaking_of_moments(_is_about_moments(result)):
         if ax is not None:
             draw(ax, result)
             return ax
         from matplotlib import pyplot
 
         with context():
-            made, ax = pyplot.subplots(figsize=size_of(result), layout="constrained")
+            drawing, ax = pyplot.subplots(figsize=size_of(result), layout="constrained")
             draw(ax, result)
-            write_caption(made, caption_of_result(result))
+            write_caption(drawing, caption_of_result(result))
         return ax
 
 
 def notebook(result: Any) -> str:
     """A result as HTML: its few lines, and its figure beneath."""
-    made, ax = figure(*size_of(result))
-    with context(), speaking_of_moments(_turns(result)):
+    drawing, ax = figure(*size_of(result))
+    with context(), speaking_of_moments(_is_about_moments(result)):
         drawing_of(result)(ax, result)
-        write_caption(made, caption_of_result(result))
-    picture = inline_svg(made, f"zwidth-{next(FIGURE_NUMBERS)}", repr(result).splitlines()[0])
+        write_caption(drawing, caption_of_result(result))
+    picture = inline_svg(drawing, f"zwidth-{next(FIGURE_NUMBERS)}", repr(result).splitlines()[0])
     return f"<pre>{escape(repr(result))}</pre>\n<div style='max-width: 40em'>{picture}</div>"
 
 
-def _turns(result: Any) -> bool:
+def _is_about_moments(result: Any) -> bool:
     """Whether a result is about moments about an axis."""
     return result.operating_point is not None and result.operating_point.turns
 
@@ -156,7 +156,7 @@ def _draw_sensitivities(ax: Axes, result: Any) -> None:
 
 
 def _draw_wall_verdicts(ax: Axes, verdicts: Any) -> None:
-    """The walls as marks: discs where stable, crosses where not, grey squares where undecided."""
+    """The walls (K, B) as marks: discs where stable, crosses where not, grey squares where undecided."""
     K, B, names = verdicts.stiffness.ravel(), verdicts.damping.ravel(), np.array(verdicts.names)
     for name, style in (
         ("stable", {"marker": "o", "color": BLACK}),

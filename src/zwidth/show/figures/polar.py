@@ -74,7 +74,10 @@ def _draw_outline(ax: Axes, stiffness: Floats, angle: Floats) -> None:
 
 
 def _draw_bars(ax: Axes, stiffness: Floats, angle: Floats) -> None:
-    """Draw a bar from the middle along each direction in which the handle moves."""
+    """Draw a bar from the middle along each direction in which the handle moves.
+
+    stiffness, angle  (k,)  [N/m], [rad]
+    """
     ends = stiffness[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     bars = LineCollection(
         [np.vstack([np.zeros(2), end]) for end in ends],
@@ -86,7 +89,7 @@ def _draw_bars(ax: Axes, stiffness: Floats, angle: Floats) -> None:
 
 
 def _extremes(stiffness: Floats, angles_deg: Floats) -> list[tuple[str, int, str]]:
-    """Text, index and marker of the stiffest and the least stiff direction; one where both are alike."""
+    """Legend text, index and marker of the stiffest and the least stiff direction; of one where both are alike."""
     most, least = int(np.nanargmax(stiffness)), int(np.nanargmin(stiffness))
     if stiffness[most] - stiffness[least] > ALIKE * stiffness[most]:
         found = [("stiffest", most, "o"), ("least stiff", least, "s")]

@@ -60,8 +60,11 @@ def draw_goal(ax: Axes, goal: Goal, top: int = 12) -> None:
     _draw_bars(ax, shown, f"Change of one number for a largest stiffness of {wanted} [%]")
 
 
-def _draw_bars(ax: Axes, shown: list[tuple[str, float]], label: str) -> None:
-    """A bar for each number, with its value beside it, from the top."""
+def _draw_bars(ax: Axes, shown: list[tuple[str, float]], axis_name: str) -> None:
+    """Draw a bar for each number, from the top, with its value beside it.
+
+    shown  path and value [%] of each
+    """
     rows = list(range(len(shown), 0, -1))
     values = [value for _, value in shown]
     widest = max((abs(value) for value in values), default=1.0)
@@ -69,8 +72,8 @@ def _draw_bars(ax: Axes, shown: list[tuple[str, float]], label: str) -> None:
         _draw_bar(ax, row, value)
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
-    labels = [_fitted(_short(path), 0.45 * figure_width(ax)) for path, _ in shown]
-    beside = figure_width(ax) - _widest(labels) - MARGINS
+    labels = [_on_two_lines_if_wide(_short_path(path), 0.45 * figure_width(ax)) for path, _ in shown]
+    beside = figure_width(ax) - _widest_line(labels) - MARGINS
     # numbers stand outside of the bars: both sides have room for the longest, whatever the bars span
     sides = (low < 0.0) + (high > 0.0)
     share = max(NUMBER_ROOM, NUMBER_WIDTH / max(beside - sides * NUMBER_WIDTH, NUMBER_WIDTH))
@@ -82,7 +85,7 @@ def _draw_bars(ax: Axes, shown: list[tuple[str, float]], label: str) -> None:
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
     ax.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    ax.set_xlabel("\n".join(wrapped(label, beside, AXIS_SIZE)))
+    ax.set_xlabel("\n".join(wrapped(axis_name, beside, AXIS_SIZE)))
     if not shown:
         ax.set_yticks([])
         ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)
@@ -113,18 +116,18 @@ def _draw_bar(ax: Axes, row: int, value: float) -> None:
     )
 
 
-def _widest(labels: list[str]) -> float:
-    """Width of the widest line [points]."""
+def _widest_line(labels: list[str]) -> float:
+    """Width of the widest line of labels, which may have several lines [points]."""
     return max((text_width(line, TICK_SIZE) for label in labels for line in label.split("\n")), default=0.0)
 
 
-def _fitted(path: str, width: float) -> str:
+def _on_two_lines_if_wide(path: str, width: float) -> str:
     """The path on one line, or with its last name on a second where it is wider than `width` [points]."""
     table, dot, name = path.rpartition(".")
     return path if text_width(path, TICK_SIZE) <= width or not dot else f"{table}.\n{name}"
 
 
-def _short(path: str) -> str:
+def _short_path(path: str) -> str:
     """A path without "mechanism.", with which nearly all begin."""
     return path.removeprefix("mechanism.")
 

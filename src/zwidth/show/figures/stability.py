@@ -98,8 +98,9 @@ def edges_of(rings: Sequence[Floats]) -> list[Floats]:
     """
     if not len(rings):
         return []
-    pieces = [np.hstack([ring[:-1], ring[1:]]) for ring in rings]
+    pieces = [np.hstack([ring[:-1], ring[1:]]) for ring in rings]  # rows (K, B) of one end, (K, B) of the other
     ends = np.vstack(pieces)
+    # a piece that two rings share may run either way: its ends are put in the order of K, then of B
     backwards = (ends[:, 0] > ends[:, 2]) | ((ends[:, 0] == ends[:, 2]) & (ends[:, 1] > ends[:, 3]))
     ordered = np.where(backwards[:, None], ends[:, [2, 3, 0, 1]], ends)
     _, inverse, count = np.unique(ordered, axis=0, return_inverse=True, return_counts=True)
@@ -107,8 +108,8 @@ def edges_of(rings: Sequence[Floats]) -> list[Floats]:
     outlines = []
     for ring, cut in zip(rings, shared, strict=True):
         # a point in the middle of each cut, without coordinates, ends the line there
-        at = np.flatnonzero(cut) + 1
-        outlines.append(np.insert(np.asarray(ring, dtype=float), at, np.nan, axis=0))
+        breaks = np.flatnonzero(cut) + 1
+        outlines.append(np.insert(np.asarray(ring, dtype=float), breaks, np.nan, axis=0))
     return outlines
 
 
@@ -173,19 +174,22 @@ def draw_decay_contours(
             level = stability_chart(loop, radius, decay=False).drawn()
         except ChartError:  # a sliver too fine to close: this level is left out of the drawing, and its legend
             continue
-        draw_level(ax, level, _meaning(radius, loop.period), n + 1, len(levels) + 1)
+        draw_level(ax, level, _radius_text(radius, loop.period), n + 1, len(levels) + 1)
     buildable = chart.fastest_decay_in_first_quadrant
-    _star(ax, buildable, f"fastest{' with K, B ≥ 0' * (best != buildable)}", loop.period, VERMILION)
+    _draw_star(ax, buildable, f"fastest{' with K, B ≥ 0' * (best != buildable)}", loop.period, VERMILION)
     if best != buildable:
-        _star(ax, best, "fastest of all", loop.period, "white")
+        _draw_star(ax, best, "fastest of all", loop.period, "white")
     frame(ax, window or chart.box, empty=not chart.regions)
     legend_above(ax, columns=2, title="Slowest motion: factor per sample (time until a tenth is left)")
 
 
-def _star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour: str) -> None:
-    """A star at the wall, if there is one; its name and what its radius means stand in the legend."""
+def _draw_star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour: str) -> None:
+    """Draw a star of this colour at the wall, if there is one; its name and its radius stand in the legend.
+
+    period  T [s]
+    """
     if wall:
-        title = f"{name}: {_meaning(wall.spectral_radius, period)}"
+        title = f"{name}: {_radius_text(wall.spectral_radius, period)}"
         (star,) = ax.plot([wall.stiffness], [wall.damping], "*", color=VERMILION, markersize=11.0, label=title)
         star.set(markerfacecolor=colour, zorder=5.0)
 
@@ -201,10 +205,11 @@ def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int
 def round_radii(smallest: float, most: int = 5) -> list[float]:
     """At most `most` round numbers strictly between the smallest radius and 1, descending."""
     for step in (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005, 0.0002, 0.0001, 1e-5, 1e-6):
+        # multiples of the step between 1 and the smallest radius; one within a thousandth of a step of it is not
         count = int(np.ceil((1.0 - smallest) / step - 1e-3)) - 1
         if count >= min(3, most):
-            every = -(-count // most)
-            return [round(1.0 - step * k, 9) for k in range(every, count + 1, every)]
+            stride = -(-count // most)
+            return [round(1.0 - step * k, 9) for k in range(stride, count + 1, stride)]
     return []
 
 
@@ -215,7 +220,7 @@ def tenfold_time(radius: float, period: float) -> float:
     return inf if radius >= 1.0 else period * log(10.0) / -log(radius)
 
 
-def _meaning(radius: float, period: float) -> str:
+def _radius_text(radius: float, period: float) -> str:
     """A spectral radius, with the time in which its motion shrinks to a tenth, in words.
 
     period  T [s]
@@ -238,11 +243,11 @@ def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
         inside = (arc.stiffness >= -SAME_WALL * width) & (arc.damping >= 0.0)
         K, f = np.where(inside, arc.stiffness, np.nan), np.where(inside, arc.frequency, np.nan)
         ax.plot(K, f, color=BLUE, label="" if n else "along the edge of stability")
-    for n, (at, _, low, high) in enumerate(corners(chart)):
+    for n, (K_corner, _, low, high) in enumerate(corners(chart)):
         text = f"corner: {quantity(low, 'Hz')} and {quantity(high, 'Hz')}"
-        ax.plot([at, at], [low, high], color=VERMILION, linewidth=0.8, linestyle=":")
+        ax.plot([K_corner, K_corner], [low, high], color=VERMILION, linewidth=0.8, linestyle=":")
         ax.plot(
-            [at, at],
+            [K_corner, K_corner],
             [low, high],
             marker="o",
             markersize=6.0,
@@ -253,7 +258,7 @@ def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
             zorder=4.0,
             label=text if n < 3 else "",
         )
-    _natural_frequencies(ax, chart)
+    _draw_natural_frequencies(ax, chart)
     ax.set_xlim(left=0.0)
     ax.set_ylim(bottom=0.0)
     label(ax.xaxis, "Virtual stiffness K", "N/m")
@@ -287,8 +292,8 @@ def _ends(arc: BoundaryArc) -> list[tuple[float, float, float]]:
     return [(float(arc.stiffness[k]), float(arc.damping[k]), float(arc.frequency[k])) for k in (0, -1)]
 
 
-def _natural_frequencies(ax: Axes, chart: StabilityChart) -> None:
-    """The flexible modes below half the sampling frequency, as lines across."""
+def _draw_natural_frequencies(ax: Axes, chart: StabilityChart) -> None:
+    """The first eight flexible modes below half the sampling frequency, as lines across."""
     natural = natural_frequencies(chart.loop.plant)
     shown = [f for f in natural if 0.0 < f < 0.5 / chart.loop.period][:8]
     for n, f in enumerate(shown):
@@ -316,13 +321,13 @@ def draw_robust(
     members  path -> value of each, for the legend
     window   what to show; left out: the box of all outlines' part with K >= 0 and B >= 0, and 5 %
     """
-    view = window or _box(chart)
+    view = window or _default_window(chart)
     for n, ring in enumerate(chart.regions):
-        text = "" if n else _claim(chart)
+        text = "" if n else _filled_set_text(chart)
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=text, zorder=1.1))
     _draw_members(ax, chart)
     for n, outline in enumerate(chart.outlines[chart.best_by_area]):
-        text = "" if n else f"best member by area: {_words(members, chart.best_by_area)}"
+        text = "" if n else f"best member by area: {_member_words(members, chart.best_by_area)}"
         ax.plot(*outline.T, color=GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
     _draw_edge(ax, chart, members, view)
     frame(ax, view, empty=not chart.regions)
@@ -332,8 +337,8 @@ def draw_robust(
 def _draw_members(ax: Axes, chart: CommonChart) -> None:
     """Shade what any member allows, and draw the edges of some, spread evenly over the members by area."""
     outlines = chart.outlines
-    by_area = sorted(outlines, key=lambda index: sum(map(_area, outlines[index])))
-    shaded, lined = (_spread(by_area, most) for most in (DRAWN_MEMBERS, DRAWN_EDGES))
+    by_area = sorted(outlines, key=lambda index: sum(map(_ring_area, outlines[index])))
+    shaded, lined = (_evenly_chosen(by_area, most) for most in (DRAWN_MEMBERS, DRAWN_EDGES))
     rings = [ring for index in shaded for ring in outlines[index]]
     ax.add_collection(PolyCollection(rings, facecolors=SHADE, zorder=1.0, label="stable for some member"))
     edges = [ring for index in lined for ring in outlines[index]]
@@ -341,18 +346,18 @@ def _draw_members(ax: Axes, chart: CommonChart) -> None:
     ax.add_collection(LineCollection(edges, colors=LIGHT, linewidths=0.5, zorder=1.2, label=text))
 
 
-def _area(ring: Floats) -> float:
+def _ring_area(ring: Floats) -> float:
     """Area within a closed ring (k, 2)."""
     x, y = ring.T
     return 0.5 * abs(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
 
 
-def _spread(items: Sequence[int], most: int) -> list[int]:
+def _evenly_chosen(items: Sequence[int], most: int) -> list[int]:
     """At most `most` of the items, evenly spread, the first and the last among them."""
     return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int))]
 
 
-def _claim(chart: CommonChart) -> str:
+def _filled_set_text(chart: CommonChart) -> str:
     """What the filled set is, for the legend."""
     if chart.failed:
         known = len(chart.charted)
@@ -363,21 +368,21 @@ def _claim(chart: CommonChart) -> str:
 def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:
     """Draw the edge's arcs; the members who bind most of what is seen have a line and a name of their own."""
     K0, K1, B0, B1 = view
-    lengths: dict[int, float] = {}
+    lengths: dict[int, float] = {}  # member -> length of the edge that it binds in view, whose sides are 1
     for arc in chart.boundary:
         x, y = (arc.stiffness - K0) / (K1 - K0), (arc.damping - B0) / (B1 - B0)
         inside = (x > 0.0) & (x < 1.0) & (y > 0.0) & (y < 1.0)
         length = float(np.sum(np.hypot(np.diff(x), np.diff(y))[inside[1:] & inside[:-1]]))
         lengths[arc.member] = lengths.get(arc.member, 0.0) + length
-    least = SHORTEST * sum(lengths.values())
+    least_length = SHORTEST * sum(lengths.values())
     ranked = sorted(lengths, key=lambda member: -lengths[member])
-    named = [member for member in ranked if lengths[member] > least][:NAMED]
+    named = [member for member in ranked if lengths[member] > least_length][:NAMED]
     others = sum(length for member, length in lengths.items() if member not in named)
-    drawn = {"limited by others"} if others <= least else set[str]()
+    drawn = {"limited by others"} if others <= least_length else set[str]()
     for arc in chart.boundary:
         place = named.index(arc.member) if arc.member in named else NAMED
         colour, dashes = LINES[place]
-        text = f"limited by {_words(members, arc.member)}" if place < NAMED else "limited by others"
+        text = f"limited by {_member_words(members, arc.member)}" if place < NAMED else "limited by others"
         ax.plot(
             arc.stiffness,
             arc.damping,
@@ -390,7 +395,7 @@ def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]
         drawn.add(text)
 
 
-def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
+def _member_words(members: Sequence[Mapping[str, Any]], index: int) -> str:
     """A member's values in words, on two lines at most: the last step of each path, where that is clear."""
     if index >= len(members) or not members[index]:
         return f"member {index}"
@@ -406,8 +411,11 @@ def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
     return "\n".join(lines)
 
 
-def _box(chart: CommonChart) -> Window:
-    """What is shown: what single members allow with K >= 0 and B >= 0, at most MOST_REACH times the robust set."""
+def _default_window(chart: CommonChart) -> Window:
+    """KMIN, KMAX, BMIN, BMAX of what single members allow with K, B >= 0, at most MOST_REACH times the robust set.
+
+    0 to 1 where nothing is stable for every member
+    """
     walls = [outline for outlines in chart.outlines.values() for outline in outlines]
     if isnan(chart.stiffness_max) or not walls:
         return (0.0, 1.0, 0.0, 1.0)
@@ -436,8 +444,8 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
     for ring in edges_of(chart.regions):
         ax.plot(*ring.T, color=BLACK, linewidth=0.9)
     _draw_measured_points(ax, chart)
-    _unusable(ax, chart)
-    if chart.stiffness_max == chart.stiffness_max:
+    _draw_unusable(ax, chart)
+    if chart.stiffness_max == chart.stiffness_max:  # not nan
         mark_stiffest(ax, chart, f"stiffest, certain: {quantity(chart.stiffness_max, 'N/m')}")
     if chart.band is not None and chart.stiffness_max_nominal == chart.stiffness_max_nominal:
         ax.plot(
@@ -483,7 +491,7 @@ def _draw_measured_points(ax: Axes, chart: MeasuredChart) -> None:
             )
 
 
-def _unusable(ax: Axes, chart: MeasuredChart) -> None:
+def _draw_unusable(ax: Axes, chart: MeasuredChart) -> None:
     """Draw the edge dashed within the unusable stretches that it runs through, each a line of the legend."""
     edge = chart.edge
     f = edge.angles / (2.0 * np.pi * chart.loop.period)
@@ -509,7 +517,10 @@ CIRCLE: Final = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361))
 
 
 def draw_eigenvalue_paths(ax: Axes, paths: EigenvaluePaths) -> None:
-    """Each path in its own colour from a circle to a square; crosses where it passes through the unit circle."""
+    """Each path of eigenvalues z in its own colour; crosses where it passes through the unit circle.
+
+    It begins at a circle, at the first value of what is varied, and ends at a square, at the last.
+    """
     ax.plot(CIRCLE.real, CIRCLE.imag, color=GREY, linewidth=0.8, label="unit circle", zorder=1.0)
     for n, z in enumerate(paths.eigenvalues.T):
         colour, dashes = LINES[n % len(LINES)]

@@ -86,12 +86,12 @@ def study_figure(dataset: xr.Dataset) -> Figure:
         dataset = dataset.sortby(key)
     lines = int(np.prod([dataset.sizes[key] for key in texts]))
     if _few_lines(dataset, names[0], numeric, texts):
-        return _curves(dataset, names, numeric[0] if numeric else texts[0])
+        return _curves_figure(dataset, names, numeric[0] if numeric else texts[0])
     if dataset[names[0]].dims == ("design",):
-        return _parallel(dataset, names)
+        return _parallel_figure(dataset, names)
     if len(numeric) == 2 and lines * len(names) <= MOST_PANELS and min(dataset.sizes[k] for k in numeric) > 1:
-        return _heat_maps(dataset, names, numeric, texts)
-    return _parallel(dataset, names)
+        return _heat_figure(dataset, names, numeric, texts)
+    return _parallel_figure(dataset, names)
 
 
 def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
@@ -105,13 +105,13 @@ def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
         others = [key for key in (*numeric, *texts) if key != along]
         lost = draw_curves(ax, dataset, name, along)
         handles = list(_line_handles(dataset, others, lines=bool(numeric)))
-        _legend_above(ax, handles, [_symbol(status) for status in lost])
+        _legend_above(ax, handles, [_symbol_handle(status) for status in lost])
     elif len(numeric) == 2 and not texts and min(dataset.sizes[key] for key in numeric) > 1:
         hatched = draw_heat_map(ax, dataset, name, numeric[0], numeric[1])
         _legend_above(ax, [], [status_patch(status) for status in hatched])
     else:
         dims = [str(dim) for dim in dataset[name].dims]
-        draw_parallel(ax, dataset, dims if dims != ["design"] else _keys_of(dataset), [name])
+        draw_parallel(ax, dataset, dims if dims != ["design"] else _listed_axes(dataset), [name])
 
 
 def _few_lines(dataset: xr.Dataset, name: str, numeric: Sequence[str], texts: Sequence[str]) -> bool:
@@ -123,7 +123,7 @@ def _few_lines(dataset: xr.Dataset, name: str, numeric: Sequence[str], texts: Se
 
 
 def _split_axes(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The axes of numbers, and those of texts."""
+    """Return the keys of the axes of numbers, and of those of texts or of a single value, of columns `names`."""
     axes = [str(dim) for dim in dataset[names[0]].dims]
     numeric = [key for key in axes if dataset[key].dtype.kind in "if"] if axes != ["design"] else []
     # one of a single value cannot be drawn as an axis; it is stated beside the texts
@@ -134,7 +134,7 @@ def _split_axes(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], l
 # --- curves -----------------------------------------------------------------------------------------
 
 
-def _curves(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
+def _curves_figure(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
     """A panel for each column over the axis `along`, one legend of lines and missing values above all."""
     others = [str(dim) for dim in dataset[names[0]].dims if dim != along]
     lines = 1 if not others else int(np.prod([dataset.sizes[key] for key in others]))
@@ -149,12 +149,12 @@ def _curves(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
         panel.set_xlabel("")
     numeric = dataset[along].dtype.kind in "if"
     handles = list(_line_handles(dataset, others, lines=numeric))
-    _legend_above(panels[0], handles, [_symbol(status) for status in sorted(statuses)])
+    _legend_above(panels[0], handles, [_symbol_handle(status) for status in sorted(statuses)])
     return drawing
 
 
 def _panels(width: float, height: float, rows: int, columns: int, count: int) -> tuple[Figure, list[Axes]]:
-    """A figure with so many axes, row after row."""
+    """A figure of this size [inches], and `count` axes in its grid of rows and columns, row after row."""
     drawing, ax = figure(width, height)
     grid = drawing.add_gridspec(rows, columns)
     ax.set_subplotspec(grid[0])
@@ -178,9 +178,9 @@ def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[in
         if numeric and len(x) <= MARKED:
             style |= {"marker": "o", "markersize": 3.2}
         ax.plot(x, np.where(np.isfinite(y), y, np.nan), zorder=2.0 + 0.01 * n, **style)
-        here = status.sel(chosen).transpose(along).values
-        if np.isin(here, list(SYMBOLS)).any():
-            missing.append((style["color"], here))
+        statuses = status.sel(chosen).transpose(along).values
+        if np.isin(statuses, list(SYMBOLS)).any():
+            missing.append((style["color"], statuses))
     _draw_missing(ax, x, missing)
     if not np.isfinite(column.values).any():
         ax.set_yticks([])
@@ -199,7 +199,7 @@ def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[in
     _name_column(ax, column)
     _name_axis(ax, "x", dataset[along])
     ax.margins(x=BESIDE)
-    return [kind for kind in SYMBOLS if any((here == kind).any() for _, here in missing)]
+    return [kind for kind in SYMBOLS if any((statuses == kind).any() for _, statuses in missing)]
 
 
 class TicksAbove(AutoLocator):
@@ -214,19 +214,19 @@ class TicksAbove(AutoLocator):
 
 
 def _draw_missing(ax: Axes, x: NDArray[Any], missing: Sequence[tuple[str, NDArray[np.uint8]]]) -> None:
-    """A row of symbols for each line that has gaps, below all lines."""
+    """Draw a row of symbols below all lines for each that has gaps: its colour, and the status (k,) at x (k,)."""
     if not missing:
         return
     low, high = ax.get_ylim()
-    foot = MARK_HEIGHT * (len(missing) + 0.5)
+    foot = MARK_HEIGHT * (len(missing) + 0.5)  # share of the panel's new height that the rows take
     ax.set_ylim(low - (high - low) * foot / (1.0 - foot), high)
     ax.yaxis.set_major_locator(TicksAbove(low))
     ax.axhline(low, color=GREY, linewidth=0.5)
-    for row, (colour, here) in enumerate(missing):
+    for row, (colour, status) in enumerate(missing):
         for kind, symbol in SYMBOLS.items():
             ax.plot(
-                x[here == kind],
-                np.full(int((here == kind).sum()), MARK_HEIGHT * (row + 0.75)),
+                x[status == kind],
+                np.full(int((status == kind).sum()), MARK_HEIGHT * (row + 0.75)),
                 symbol,
                 color=colour,
                 markersize=4.0,
@@ -248,7 +248,7 @@ def _name_column(ax: Axes, column: Any) -> None:
 
 
 def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
-    """Name the x or y axis by the key of a coordinate, in SI units, or by its texts."""
+    """Name the x or y axis, `which`, by the key of a coordinate in SI units; of texts, number it by them."""
     axis = ax.xaxis if which == "x" else ax.yaxis
     key = str(coordinate.attrs.get("long_name", coordinate.name))
     if coordinate.dtype.kind not in "if":
@@ -282,12 +282,13 @@ def _line_handles(dataset: xr.Dataset, keys: Sequence[str], *, lines: bool) -> I
 
 
 def _line_style(n: int) -> dict[str, Any]:
+    """Colour and dashes of the n-th line."""
     colour, dashes = LINES[n % len(LINES)]
     return {"color": colour, "linestyle": dashes}
 
 
 def _marker_style(n: int) -> dict[str, Any]:
-    """A point among texts: larger and larger open ones, so that those that coincide are seen."""
+    """Marks of the n-th combination over an axis of texts: open ones, ever larger, so that none hides another."""
     colour, _ = LINES[n % len(LINES)]
     filled = {} if n == 0 else {"markerfacecolor": "none"}
     return {"color": colour, "linestyle": "none", "marker": POINTS[n], "markersize": 4.0 + 2.0 * n, **filled}
@@ -300,7 +301,7 @@ def _combination_text(chosen: dict[str, Any]) -> str:
     )
 
 
-def _symbol(status: int) -> Line2D:
+def _symbol_handle(status: int) -> Line2D:
     """The legend's entry of the symbol of designs with this status."""
     style: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markersize": 4.5, "color": BLACK}
     return Line2D([], [], marker=SYMBOLS[status], label=STATUS[status], **style)
@@ -311,7 +312,7 @@ def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
     handles = [*lines, *marks]
     if not handles:
         return
-    made = ax.legend(
+    legend = ax.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.02),
@@ -323,21 +324,21 @@ def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
         frameon=False,
         alignment="left",
     )
-    made.set_zorder(6.0)
+    legend.set_zorder(6.0)
 
 
 # --- heat maps --------------------------------------------------------------------------------------
 
 
-def _heat_maps(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], texts: Sequence[str]) -> Figure:
-    """A heat map for each column and each combination of the texts; the maps of one column share their colours."""
+def _heat_figure(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], texts: Sequence[str]) -> Figure:
+    """A heat map over both `axes` for each column and combination of `texts`; those of a column share colours."""
     choices = list(_combinations(dataset, texts))
     wide = len(choices) if len(choices) > 1 else min(2, len(names))
     high = len(names) if len(choices) > 1 else -(-len(names) // wide)
-    each = [(name, chosen) for name in names for chosen in choices]
-    drawing, panels = _panels(4.3 * wide + (0.9 if wide == 1 else 0.0), 3.1 * high + 0.5, high, wide, len(each))
+    maps = [(name, chosen) for name in names for chosen in choices]
+    drawing, panels = _panels(4.3 * wide + (0.9 if wide == 1 else 0.0), 3.1 * high + 0.5, high, wide, len(maps))
     statuses: dict[int, None] = {}
-    for panel, (name, chosen) in zip(panels, each, strict=True):
+    for panel, (name, chosen) in zip(panels, maps, strict=True):
         values = np.asarray(dataset[name].values, dtype=float)
         statuses |= dict.fromkeys(draw_heat_map(panel, dataset.sel(chosen), name, axes[0], axes[1], values))
         if chosen:
@@ -358,7 +359,7 @@ def draw_heat_map(
     scale    values that the colours span; left out: those shown
     Returns  the statuses that are hatched
     """
-    x, y = (_edges(dataset[key]) for key in (first, second))
+    x, y = (_cell_edges(dataset[key]) for key in (first, second))
     column = dataset[name].transpose(second, first)
     values = np.asarray(column.values, dtype=float)
     status = dataset[f"{name}_status"].transpose(second, first).values
@@ -382,7 +383,7 @@ def draw_heat_map(
 
 
 def constant_text(column: Any, values: Floats) -> str:
-    """What a column says that has the same value in all designs; "" where it has not."""
+    """Title and value of a column whose `values` are the same in all designs, in words; "" where they are not."""
     finite = values[np.isfinite(values)]
     if not len(finite) or np.isinf(values).any() or np.ptp(finite) > SAME * float(np.abs(finite).max()):
         return ""
@@ -393,30 +394,29 @@ def constant_text(column: Any, values: Floats) -> str:
 PAPER: Final = ListedColormap(["#F2F2F2"])
 
 
-def _edges(coordinate: Any) -> Floats:
-    """Ends (k + 1,) of the cells about an axis's values (k,), halfway between them, by ratio on a logarithmic
-    one."""
+def _cell_edges(coordinate: Any) -> Floats:
+    """Ends (k + 1,) of cells, halfway between an axis's values (k,) and as far outside; by ratio on a log axis."""
     values = np.asarray(coordinate.values, dtype=float)
     logarithmic = coordinate.attrs.get("scale") == "log" and bool((values > 0.0).all())
-    at = np.log(values) if logarithmic else values
-    inner = 0.5 * (at[1:] + at[:-1])
-    edges = np.concatenate([[at[0] - (inner[0] - at[0])], inner, [at[-1] + (at[-1] - inner[-1])]])
+    mid = np.log(values) if logarithmic else values
+    inner = 0.5 * (mid[1:] + mid[:-1])
+    edges = np.concatenate([[mid[0] - (inner[0] - mid[0])], inner, [mid[-1] + (mid[-1] - inner[-1])]])
     return np.asarray(np.exp(edges) if logarithmic else edges)
 
 
 # --- parallel coordinates ---------------------------------------------------------------------------
 
 
-def _parallel(dataset: xr.Dataset, names: Sequence[str]) -> Figure:
+def _parallel_figure(dataset: xr.Dataset, names: Sequence[str]) -> Figure:
     """A figure of parallel coordinates: an upright for each axis of the study, and for each column."""
     dims = [str(dim) for dim in dataset[names[0]].dims]
-    keys = dims if dims != ["design"] else _keys_of(dataset)
+    keys = dims if dims != ["design"] else _listed_axes(dataset)
     drawing, ax = figure(max(5.6, 1.25 * (len(keys) + len(names)) + 0.8), 4.3)
     draw_parallel(ax, dataset, keys, names)
     return drawing
 
 
-def _keys_of(dataset: xr.Dataset) -> list[str]:
+def _listed_axes(dataset: xr.Dataset) -> list[str]:
     """The axes of a study whose designs are listed, as of a Latin hypercube: coordinates with the role of one."""
     return [str(key) for key in dataset.coords if key != "design" and dataset[key].attrs.get("role") == "axis"]
 
@@ -484,7 +484,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
         LineCollection(lines, colors=list(map(tuple, colours)), linewidths=thin, alpha=0.75, zorder=2.0)
     )
     incomplete = np.flatnonzero(~complete)
-    parts = [part for n in incomplete for part in _pieces(across, heights[n])]
+    parts = [part for n in incomplete for part in _complete_parts(across, heights[n])]
     if len(incomplete):
         # they end in a cross where the first number is missing
         drawn = LineCollection(
@@ -513,7 +513,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
         )
 
 
-def _pieces(across: Any, heights: Floats) -> list[Floats]:
+def _complete_parts(across: Any, heights: Floats) -> list[Floats]:
     """The parts (k, 2) of a line between missing numbers, those of one point left out."""
     there = np.isfinite(heights)
     cuts = np.flatnonzero(np.diff(there.astype(int))) + 1
@@ -544,26 +544,25 @@ def _draw_uprights(ax: Axes, uprights: Sequence[ParallelAxis], keys: int) -> Non
 
 
 def _parallel_axis(column: Any, values: NDArray[Any]) -> ParallelAxis:
-    """The upright of an axis or a column with the values (designs,): texts evenly spread, numbers in
-    proportion."""
+    """The upright of an axis or a column of values (designs,): texts evenly spread, numbers in proportion."""
     name = str(column.attrs.get("title") or column.attrs.get("long_name") or column.name)
     unit = spoken_unit(str(column.attrs.get("unit", column.attrs.get("units", ""))))
     if values.dtype.kind not in "ifu":
         kinds = list(dict.fromkeys(map(str, values)))
         at = {kind: (n + 0.5) / len(kinds) for n, kind in enumerate(kinds)}
         return ParallelAxis(
-            _lines(name), np.array([at[str(value)] for value in values]), {at[kind]: kind for kind in kinds}
+            _in_lines(name), np.array([at[str(value)] for value in values]), {at[kind]: kind for kind in kinds}
         )
-    x = np.where(np.isfinite(values), values, np.nan).astype(float)
-    finite = x[np.isfinite(x)]
+    numbers = np.where(np.isfinite(values), values, np.nan).astype(float)
+    finite = numbers[np.isfinite(numbers)]
     if not len(finite):
-        return ParallelAxis(_lines(_with_unit(name, unit)), x, {})
+        return ParallelAxis(_in_lines(_with_unit(name, unit)), numbers, {})
     low, high = float(finite.min()), float(finite.max())
-    if low == high:
+    if low == high:  # drawn in the middle
         return ParallelAxis(
-            _lines(_with_unit(name, unit)), np.where(np.isfinite(x), 0.5, np.nan), {0.5: f"{low:.4g}"}
+            _in_lines(_with_unit(name, unit)), np.where(np.isfinite(numbers), 0.5, np.nan), {0.5: f"{low:.4g}"}
         )
-    measured = "title" in column.attrs
+    measured = "title" in column.attrs  # a column, and no axis of the study
     logarithmic = low > 0.0 and (high / low > WIDE**2 if measured else column.attrs.get("scale") == "log")
     exponent = exponent_of(max(abs(low), abs(high))) if measured and unit else 0
     if scaled(exponent, unit).startswith("10") and 0.01 <= max(abs(low), abs(high)) < 1e4:
@@ -572,24 +571,24 @@ def _parallel_axis(column: Any, values: NDArray[Any]) -> ParallelAxis:
     levels = [v for v in locator.tick_values(low, high) if low <= v <= high]
     scale = np.log if logarithmic else np.asarray
     ends = scale(low), scale(high)
-    places = (scale(x) - ends[0]) / (ends[1] - ends[0])
+    places = (scale(numbers) - ends[0]) / (ends[1] - ends[0])
     ticks = {
         float((scale(v) - ends[0]) / (ends[1] - ends[0])): f"{v / 10.0**exponent:.4g}".replace("-", MINUS)
         for v in levels
     }
-    return ParallelAxis(_lines(_with_unit(name, scaled(exponent, unit) if unit else "")), places, ticks)
+    return ParallelAxis(_in_lines(_with_unit(name, scaled(exponent, unit) if unit else "")), places, ticks)
 
 
 def _with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def _lines(name: str) -> str:
+def _in_lines(name: str) -> str:
     """A label in lines that fit between uprights; a path breaks at its dots."""
     words = (
         name.replace(".", ".\u200b").replace(" [", "\u200b [").split("\u200b") if "." in name else name.split(" ")
     )
-    blank = "" if "." in name else " "
+    blank = "" if "." in name else " "  # a path breaks at zero-width spaces
     lines = [""]
     for word in words:
         joined = lines[-1] + blank + word if lines[-1] else word

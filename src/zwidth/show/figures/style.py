@@ -98,9 +98,9 @@ def context() -> AbstractContextManager[None]:
 def figure(width: float = 5.6, height: float = 3.9) -> tuple[Figure, Axes]:
     """A figure of this size [inches] with one pair of axes, apart from pyplot."""
     with context():
-        made = Figure(figsize=(width, height), layout="constrained")
-        FigureCanvasAgg(made)
-        return made, made.add_subplot()
+        drawing = Figure(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(drawing)
+        return drawing, drawing.add_subplot()
 
 
 def draw_empty(ax: Axes, text: str = "no wall is stable") -> None:
@@ -110,7 +110,7 @@ def draw_empty(ax: Axes, text: str = "no wall is stable") -> None:
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
-def save(made: Figure, path: str | os.PathLike[str]) -> Path:
+def save(drawing: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure as .png, .svg or .pdf, whole or not at all, without dates.
 
     Raises  ValueError   for another extension
@@ -126,11 +126,11 @@ def save(made: Figure, path: str | os.PathLike[str]) -> Path:
         ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "zwidth", "Producer": None},
     }
     with replacing(target) as draft, context():
-        _write(made, draft, kind, undated[kind])
+        _draw_into_file(drawing, draft, kind, undated[kind])
     return target
 
 
-def _write(made: Figure, target: Path | StringIO, kind: str, metadata: dict[str, Any]) -> None:
+def _draw_into_file(drawing: Figure, target: Path | StringIO, kind: str, metadata: dict[str, Any]) -> None:
     """Draw a figure into a file of this kind, in one pass.
 
     `Figure.savefig` draws twice, once for the layout. Drawing lays out first, for the very canvas that it draws
@@ -140,16 +140,16 @@ def _write(made: Figure, target: Path | StringIO, kind: str, metadata: dict[str,
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     canvas: Any = {".png": FigureCanvasAgg, ".svg": FigureCanvasSVG, ".pdf": FigureCanvasPdf}[kind]
-    before, dots = made.canvas, made.get_dpi()
-    made.set_dpi(mpl.rcParams["savefig.dpi"])
+    before, dots = drawing.canvas, drawing.get_dpi()
+    drawing.set_dpi(mpl.rcParams["savefig.dpi"])
     try:
-        getattr(canvas(made), f"print_{kind[1:]}")(target, metadata=metadata)
+        getattr(canvas(drawing), f"print_{kind[1:]}")(target, metadata=metadata)
     finally:
-        made.set_canvas(before)
-        made.set_dpi(dots)
+        drawing.set_canvas(before)
+        drawing.set_dpi(dots)
 
 
-def inline_svg(made: Figure, name: str, description: str) -> str:
+def inline_svg(drawing: Figure, name: str, description: str) -> str:
     """A figure as an <svg> element to stand in a page beside others.
 
     name         prefix of all its ids, unlike that of any other figure in the page
@@ -157,17 +157,17 @@ def inline_svg(made: Figure, name: str, description: str) -> str:
     """
     text = StringIO()
     with context():
-        _write(made, text, ".svg", {"Date": None, "Creator": "zwidth"})
+        _draw_into_file(drawing, text, ".svg", {"Date": None, "Creator": "zwidth"})
     body = text.getvalue()
     body = body[body.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r'\bid="', f'id="{name}-', body)
     body = re.sub(r'(href="|url\()#', rf"\g<1>#{name}-", body)
-    opening, rest = body.split(">", 1)
+    opening, content = body.split(">", 1)
     opening = re.sub(r'\s(width|height|version|xmlns:xlink|xmlns)="[^"]*"', "", opening)
     # an HTML page knows the namespaces; plain href needs none
-    rest = rest.replace("xlink:href=", "href=")
-    return f'{opening} role="img"><title>{escape(description)}</title>{rest.rstrip()}'
+    content = content.replace("xlink:href=", "href=")
+    return f'{opening} role="img"><title>{escape(description)}</title>{content.rstrip()}'
 
 
 class Prefixed(Formatter):
@@ -176,24 +176,27 @@ class Prefixed(Formatter):
         Virtual stiffness [kN/m]   0  2  4  6  8
 
     The prefix follows the view: it is chosen anew whenever the figure is drawn.
+
+    plain  without any prefix
     """
 
     def __init__(self, axis: Axis, name: str, unit: str, *, plain: bool = False) -> None:
-        self.of, self.name, self.unit, self.plain = axis, name, unit, plain
+        self.labelled, self.name, self.unit, self.plain = axis, name, unit, plain
         self.exponent, self.decimals = 0, 0
 
     def set_locs(self, locs: Sequence[float]) -> None:
         """Choose prefix and decimals for the ticks in view, and name the axis; called when the figure is drawn."""
-        low, high = sorted(self.of.get_view_interval())
+        low, high = sorted(self.labelled.get_view_interval())
         largest = max(abs(low), abs(high))
         self.exponent = 0 if self.plain else exponent_of(largest)
         if scaled(self.exponent, self.unit).startswith("10") and 0.01 <= largest < 1e4:
             self.exponent = 0  # short enough without a power of ten
         inside = sorted({round(x / 10.0**self.exponent, 9) for x in locs if low <= x <= high})
         self.decimals = next((d for d in range(7) if all(abs(x - round(x, d)) < 1e-7 for x in inside)), 6)
-        self.of.set_label_text(f"{self.name} [{scaled(self.exponent, self.unit)}]")
+        self.labelled.set_label_text(f"{self.name} [{scaled(self.exponent, self.unit)}]")
 
     def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label of the tick at x, which matplotlib asks for; `pos`, the tick's number, makes no difference."""
         return f"{x / 10.0**self.exponent + 0.0:.{self.decimals}f}".replace("-", MINUS)
 
 
@@ -206,12 +209,12 @@ def label(axis: Axis, name: str, unit: str, *, plain: bool = False) -> None:
 
 def legend_above(ax: Axes, columns: int = 1, title: str | None = None) -> None:
     """The legend over the axes, where it hides nothing, in so many columns, or as many as the figure holds."""
-    _legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.01), ncols=columns, title=title)
+    _draw_legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.01), ncols=columns, title=title)
 
 
 def legend_beside(ax: Axes) -> None:
     """The legend to the right of the axes, for drawings that are higher than wide."""
-    _legend(ax, loc="center left", bbox_to_anchor=(1.02, 0.5))
+    _draw_legend(ax, loc="center left", bbox_to_anchor=(1.02, 0.5))
 
 
 def number_logarithmic(axis: Axis, low: float, high: float, unit: str = "") -> None:
@@ -222,8 +225,8 @@ def number_logarithmic(axis: Axis, low: float, high: float, unit: str = "") -> N
     decades = log10(high / low) if high > low > 0.0 else 1.0
     steps = next((steps for least, steps in DECADE_STEPS if decades > least), (1.0,))
     if decades > DECADE_STEPS[-1][0]:
-        every = max(1, ceil(decades / MOST_DECADES))
-        axis.set_major_locator(LogLocator(base=10.0**every, subs=steps, numticks=99))
+        decades_apart = max(1, ceil(decades / MOST_DECADES))
+        axis.set_major_locator(LogLocator(base=10.0**decades_apart, subs=steps, numticks=99))
     else:  # less than a third of a decade has room for round numbers only
         axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: as_written(float(f"{value:.4g}"), unit)))
@@ -261,7 +264,7 @@ def figure_width(ax: Axes) -> float:
 
 
 def room_above(ax: Axes) -> float:
-    """Width of what stands above axes and does not leave the figure [points]."""
+    """Width that there is for a text above axes, from their left side to the figure's right [points]."""
     return figure_width(ax) - 72.0 * BESIDE_AXES
 
 
@@ -270,8 +273,8 @@ def fitted_columns(ax: Axes, labels: Sequence[str], columns: int, size: float = 
     room = room_above(ax)
     widths = [max(text_width(line, size) for line in text.split("\n")) + HANDLE * size for text in labels]
     for count in range(min(columns, len(labels)), 1, -1):
-        rows, more = divmod(len(labels), count)  # matplotlib makes the first columns longer
-        ends = [n * rows + min(n, more) for n in range(count + 1)]
+        rows, longer = divmod(len(labels), count)  # matplotlib makes the first columns longer
+        ends = [n * rows + min(n, longer) for n in range(count + 1)]
         needed = sum(max(widths[start:stop]) for start, stop in pairwise(ends)) + 1.6 * size * (count - 1)
         if needed <= room:
             return count
@@ -283,7 +286,7 @@ def _in_lines(text: str, room: float) -> str:
     return "\n".join(line for part in text.split("\n") for line in wrapped(part, room, LEGEND_SIZE))
 
 
-def _legend(ax: Axes, **place: Any) -> None:
+def _draw_legend(ax: Axes, **place: Any) -> None:
     """Draw the legend of all that has a label, at this place; its texts are broken into lines that fit.
 
     place  arguments of `Axes.legend`
@@ -296,7 +299,7 @@ def _legend(ax: Axes, **place: Any) -> None:
         room = room_above(ax)
         labels = [_in_lines(text, room - HANDLE * LEGEND_SIZE) for text in labels]
         place["title"] = place["title"] and _in_lines(place["title"], room)
-    made = ax.legend(
+    legend = ax.legend(
         handles,
         labels,
         borderaxespad=0.0,
@@ -308,7 +311,7 @@ def _legend(ax: Axes, **place: Any) -> None:
         alignment="left",
         **place,
     )
-    made.set_zorder(6.0)
+    legend.set_zorder(6.0)
 
 
 COLOURS: Final = "cividis"  # even steps of lightness, the same to every eye
@@ -330,6 +333,7 @@ def levels_of(values: Floats) -> Floats:
         return np.array([0.0, 1.0])
     low, high = (float(v) for v in np.percentile(finite, USUAL))
     least, most = float(finite.min()), float(finite.max())
+    # `least` and `most` are those of all values, `low` and `high` those of the usual ones
     if most - high < 0.5 * (high - low) and low - least < 0.5 * (high - low):
         low, high = least, most  # no tail to cut
     if not high - low > 1e-9 * max(abs(low), abs(high)):
@@ -337,17 +341,20 @@ def levels_of(values: Floats) -> Floats:
         reach = 0.05 * abs(middle) or 1.0
         return np.array([middle - reach, middle + reach])
     if low > 0.0 and high / low > WIDE:
-        return _ratios(low, high)
+        return _levels_by_ratio(low, high)
     levels = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     return np.asarray(levels, dtype=np.float64)
 
 
-def _ratios(low: float, high: float) -> Floats:
-    """Round levels from low to high: 1, 2, 5 or finer per decade, or a power of ten every few decades."""
+def _levels_by_ratio(low: float, high: float) -> Floats:
+    """Round levels from low to high: 1, 2, 5 or finer per decade, or a power of ten every few decades.
+
+    Of the grids within a decade the finest that makes few levels is taken.
+    """
     first, last = floor(log10(low) + 1e-12), ceil(log10(high) - 1e-12)
-    every = max(1, ceil((last - first) / LEVELS))
-    best = 10.0 ** np.arange(first, last + every, every, dtype=np.float64)
-    if every > 1:
+    decades_apart = max(1, ceil((last - first) / LEVELS))
+    best = 10.0 ** np.arange(first, last + decades_apart, decades_apart, dtype=np.float64)
+    if decades_apart > 1:
         return np.asarray(best)
     decades = 10.0 ** np.arange(first - 1, last + 1, dtype=np.float64)
     for grid in ([1.0, 3.0], [1.0, 2.0, 5.0], [1.0, 1.5, 2.0, 3.0, 5.0, 7.0]):
@@ -360,7 +367,11 @@ def _ratios(low: float, high: float) -> Floats:
 
 
 def bands_of(values: Floats, *, faint: bool = False) -> tuple[Floats, BoundaryNorm, ListedColormap]:
-    """Round levels over the values, and the colours of the bands between them and beyond."""
+    """Round levels over the values, and the colours of the bands between them and beyond.
+
+    Returns  levels (k,), ascending; the norm that gives each value the number of its band; a colour for each band,
+             one more where values lie below the lowest level, or above the highest
+    """
     levels = levels_of(values)
     under, over = bool((values < levels[0]).any()), bool((values > levels[-1]).any())
     extend: Any = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
@@ -376,7 +387,7 @@ def bands_of(values: Floats, *, faint: bool = False) -> tuple[Floats, BoundaryNo
 def colour_bar(
     ax: Axes, levels: Floats, norm: BoundaryNorm, colours: ListedColormap, title: str, unit: str
 ) -> None:
-    """The bands' colours beside the axes, as high as these are."""
+    """The bands' colours beside the axes, as high as these are; levels, norm and colours as of `bands_of`."""
     assert ax.figure is not None
     bar = ax.figure.colorbar(
         ScalarMappable(norm, colours),
@@ -393,7 +404,7 @@ def colour_bar(
 def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
     """Number the levels on a bar of colours, under a prefix or power of ten that they share, and name it."""
     exponent = _common_exponent(levels, unit)
-    texts = _texts(levels, exponent)
+    texts = _level_texts(levels, exponent)
     if any("e" in text for text in texts):
         texts = [as_written(v / 10.0**exponent) for v in levels.tolist()]
     bar.ax.set_yticks(levels, labels=[text.replace("-", MINUS) for text in texts])
@@ -404,16 +415,18 @@ def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
 
 
 def _common_exponent(levels: Floats, unit: str) -> int:
-    """The power of ten under which all levels read without an exponent; 0 where there is none."""
+    """The exponent of ten, one of a prefix, under which all levels read without "e"; 0 where there is none."""
     sizes = np.abs(levels[levels != 0.0])
     largest, least = (float(sizes.max()), float(sizes.min())) if len(sizes) else (0.0, 0.0)
     first = exponent_of(largest)
     if scaled(first, unit).startswith("10") and 0.01 <= largest < 1e4:
         first = 0  # short enough without a power of ten
     tried = (first, exponent_of(largest), exponent_of(float(np.sqrt(largest) * np.sqrt(least))))
-    return next((one for one in tried if not any("e" in text for text in _texts(levels, one))), 0)
+    return next(
+        (exponent for exponent in tried if not any("e" in text for text in _level_texts(levels, exponent))), 0
+    )
 
 
-def _texts(levels: Floats, exponent: int) -> list[str]:
-    """The levels in four digits, in units of a power of ten."""
+def _level_texts(levels: Floats, exponent: int) -> list[str]:
+    """The levels in four digits, each divided by ten to this exponent."""
     return [f"{v / 10.0**exponent:.4g}" for v in levels.tolist()]

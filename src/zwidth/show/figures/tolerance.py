@@ -36,15 +36,15 @@ def tolerance_figure(result: ToleranceStudy) -> Figure:
     bars = _bars(result)
     with context():
         below = PER_BAR * len(bars) + 0.75 if bars else 0.0
-        made = Figure(figsize=(SIZE[0], SIZE[1] + below), layout="constrained")
-        FigureCanvasAgg(made)
+        drawing = Figure(figsize=(SIZE[0], SIZE[1] + below), layout="constrained")
+        FigureCanvasAgg(drawing)
         if not bars:
-            draw_bands(made.add_subplot(), result)
-            return made
-        above, under = made.subplots(2, 1, height_ratios=[SIZE[1], below])
+            draw_bands(drawing.add_subplot(), result)
+            return drawing
+        above, under = drawing.subplots(2, 1, height_ratios=[SIZE[1], below])
         draw_bands(above, result)
         draw_worth(under, result)
-        return made
+        return drawing
 
 
 def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
@@ -54,7 +54,7 @@ def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
     for n, band in enumerate(bands):
         share = n / max(len(bands) - 1, 1)
         colour = tuple((LIGHTEST + share * (DARKEST - LIGHTEST)).tolist())
-        text = f"stable in at least {_percent(band.probability)} of the devices"
+        text = f"stable in at least {_percent_text(band.probability)} of the devices"
         ax.add_patch(
             PathPatch(band_path(band), facecolor=colour, edgecolor="none", zorder=1.1 + 0.1 * n, label=text)
         )
@@ -64,25 +64,25 @@ def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
             ax.plot(*edge.T, color=BLACK, linewidth=1.1, zorder=3.0, label=text)
     for band in result.bands[:1]:
         if band.stiffest is not None:
-            _mark(ax, band.stiffest.stiffness, band.stiffest.damping, "o", "white", _stiffest_text(band))
+            _mark_wall(ax, band.stiffest.stiffness, band.stiffest.damping, "o", "white", _stiffest_text(band))
     wall = result.question.study.wall
     if wall.stiffness is not None and wall.damping is not None and result.probability is not None:
-        text = f"wanted wall: stable in {_share(result.probability)}"
+        text = f"wanted wall: stable in {_share_text(result.probability)}"
         if result.undecided:
             text += f", undecided in {result.undecided} of {result.question.samples} devices"
-        _mark(ax, wall.stiffness, wall.damping, "D", VERMILION, text)
-    frame(ax, _view(result), empty=not any(any(band.pieces) for band in bands))
+        _mark_wall(ax, wall.stiffness, wall.damping, "D", VERMILION, text)
+    frame(ax, _default_window(result), empty=not any(any(band.pieces) for band in bands))
     legend_above(ax)
 
 
 def band_path(band: Band) -> Path:
     """A band as a path of walls [K, B]: between two dampings a trapezium for each two pieces that meet."""
     parts = []
-    for (low, one), (high, other) in pairwise(zip(band.dampings.tolist(), band.pieces, strict=True)):
-        for a, b in one:
-            for c, d in other:
-                if max(a, c) < min(b, d):
-                    parts.append(shapely.Polygon([(a, low), (b, low), (d, high), (c, high)]))
+    for (B0, pieces0), (B1, pieces1) in pairwise(zip(band.dampings.tolist(), band.pieces, strict=True)):
+        for low0, high0 in pieces0:  # stiffness from and to, at the lower damping
+            for low1, high1 in pieces1:
+                if max(low0, low1) < min(high0, high1):
+                    parts.append(shapely.Polygon([(low0, B0), (high0, B0), (high1, B1), (low1, B1)]))
     whole = shapely.union_all([part for part in parts if part.is_valid])
     rings = [
         Path(shapely.get_coordinates(ring), closed=True)
@@ -121,7 +121,10 @@ def draw_worth(ax: Axes, result: ToleranceStudy) -> None:
 
 
 def _bars(result: ToleranceStudy) -> list[tuple[str, Interval, bool]]:
-    """Key, interval and whether it differs from 0 of each tolerance, the largest first."""
+    """Key, interval, and whether that differs from 0, of each tolerance, the largest first.
+
+    The interval is of the gain in the share of devices; without a wanted wall, of the part in the spread.
+    """
     if result.tightened:
         return [(one.key, one.gain, one.is_certain) for one in result.tightened]
     outcome = next((one for one in result.indices if one.name == "stiffness_max"), None)
@@ -129,7 +132,7 @@ def _bars(result: ToleranceStudy) -> list[tuple[str, Interval, bool]]:
     return sorted(each, key=lambda one: -one[1].value)
 
 
-def _mark(ax: Axes, stiffness: float, damping: float, marker: str, face: str, text: str) -> None:
+def _mark_wall(ax: Axes, stiffness: float, damping: float, marker: str, face: str, text: str) -> None:
     """Draw a mark at a wall, filled with the colour `face`."""
     style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": VERMILION, "markeredgewidth": 1.6}
     ax.plot(
@@ -141,21 +144,21 @@ def _stiffest_text(band: Band) -> str:
     """The stiffest wall of a band in words."""
     assert band.stiffest is not None
     place = f"{quantity(band.stiffest.stiffness, 'N/m')} at {quantity(band.stiffest.damping, 'N s/m')}"
-    return f"stiffest wall of {_percent(band.probability)}: {place}"
+    return f"stiffest wall of {_percent_text(band.probability)}: {place}"
 
 
-def _percent(share: float) -> str:
+def _percent_text(share: float) -> str:
     """A share that somebody chose, as it was written."""
     return f"{as_written(100.0 * share)}\u00a0%"
 
 
-def _share(share: Interval) -> str:
+def _share_text(share: Interval) -> str:
     """A share in per cent, with its interval."""
     return f"{100.0 * share.value:.3g} % ({100.0 * share.low:.3g} to {100.0 * share.high:.3g} %)"
 
 
-def _view(result: ToleranceStudy) -> tuple[float, float, float, float]:
-    """What is shown, K and B from and to: what bands, edge in the middle and wanted wall reach of K, B >= 0."""
+def _default_window(result: ToleranceStudy) -> tuple[float, float, float, float]:
+    """KMIN, KMAX, BMIN, BMAX of what is shown: the part of bands, edge and wanted wall with K, B >= 0."""
     reach = [walls for band in result.bands if len(walls := np.asarray(band_path(band).vertices))]
     if result.nominal is not None and result.nominal.regions:
         reach.append(np.vstack(result.nominal.regions))

@@ -28,7 +28,7 @@ def sentences(facts: Facts) -> list[str]:
 
 
 def beginning(found: Bending) -> str:
-    """Which links bend, and whether the file says so or how they were chosen."""
+    """Sentences on which links bend, and whether the file says so or how they were chosen."""
     one = len(found.links) == 1
     links = f"the link {found.links[0]}" if one else f"the links {join_words(found.links)}"
     if found.given:
@@ -51,7 +51,7 @@ def beginning(found: Bending) -> str:
 
 
 def damping(found: Bending) -> str:
-    """What damps the tubes, with a blank at the end; "" where the file's damping is that of bending too."""
+    """Sentence on what damps the tubes, a blank at its end; "" where the file's damping covers bending too."""
     if not any(tube.damping_time for tube in found.tubes):
         return ""
     return (
@@ -61,7 +61,7 @@ def damping(found: Bending) -> str:
 
 
 def kept(found: Bending) -> str:
-    """Which links stay rigid, with a blank at the end; "" where none of those with a length does."""
+    """Sentences on which links stay rigid, and why, a blank at their end; "" where none with a length does."""
     if not found.kept:
         return ""
     links, verb, their = ("link", "stays", "its") if len(found.kept) == 1 else ("links", "stay", "their")
@@ -70,7 +70,7 @@ def kept(found: Bending) -> str:
 
 
 def stiffness(found: Bending) -> str:
-    """Which way the largest stiffness goes."""
+    """Sentence on which way bending moves the largest stiffness, and by how much."""
     bent, rigid = found.bent.stiffness_max, found.rigid.stiffness_max
     if isnan(bent) and isnan(rigid):
         if found.bent.reason == found.rigid.reason:
@@ -100,7 +100,7 @@ def stiffness(found: Bending) -> str:
 
 
 def felt(found: Bending, *, loaded: bool = False) -> str:
-    """What an infinitely stiff wall is felt as, at rest; "" where that is not known.
+    """Sentence on what an infinitely stiff wall is felt as, at rest; "" where that is not known.
 
     loaded  whether the device bears a load, which this leaves out
     """
@@ -121,7 +121,7 @@ def felt(found: Bending, *, loaded: bool = False) -> str:
 
 
 def first_mode(found: Bending, *, held: bool = False) -> str:
-    """Where the first mode that a wall moves goes.
+    """Sentence on which way bending moves the frequency of the first mode that a wall moves; "" without modes.
 
     held  whether somebody holds the handle, who is left out here
     """
@@ -144,8 +144,10 @@ def first_mode(found: Bending, *, held: bool = False) -> str:
 
 
 def tubes(facts: Facts) -> list[Row]:
-    """Length, diameter, wall and share of the link's mass of each tube that is assumed; [] where the file gives
-    the beams."""
+    """Link, length, diameter, wall and share of the link's mass of each tube that is assumed, as texts.
+
+    [] where the file gives the beams
+    """
     found = facts.bending
     with speaking_of_moments(False):  # these are lengths, whatever is rendered
         return [
@@ -161,19 +163,19 @@ def tubes(facts: Facts) -> list[Row]:
 
 
 def numbers(facts: Facts) -> list[Row]:
-    """What is compared, with rigid and with bending links."""
+    """Two rows of what is compared, as `_row`: with rigid and with bending links; [] where none could bend."""
     found = facts.bending
     if found is None:
         return []
     return [_row("rigid links", found.rigid), _row("bending links", found.bent)]
 
 
-def _row(label: str, of: BendingNumbers) -> Row:
-    """Label, largest stiffness, static stiffness felt at most, and first mode."""
-    static = quantity(of.static_stiffness, "N/m")
+def _row(label: str, found: BendingNumbers) -> Row:
+    """Label, largest stiffness, largest static stiffness that is felt, and first mode's frequency, as texts."""
+    static = quantity(found.static_stiffness, "N/m")
     return (
         label,
-        NONE if isnan(of.stiffness_max) else quantity(of.stiffness_max, "N/m"),
-        f"no{SPACE}limit" if of.static_stiffness == inf else static,
-        NONE if isnan(of.first_mode) else hertz(of.first_mode),
+        NONE if isnan(found.stiffness_max) else quantity(found.stiffness_max, "N/m"),
+        f"no{SPACE}limit" if found.static_stiffness == inf else static,
+        NONE if isnan(found.first_mode) else hertz(found.first_mode),
     )

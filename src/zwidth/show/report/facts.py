@@ -69,7 +69,7 @@ class Facts:
 
     @property
     def base(self) -> Variant:
-        """The device as described."""
+        """The variant in which nothing is changed: the device as described, with its chart."""
         return find_variant(self.variants, BASE)
 
     @property

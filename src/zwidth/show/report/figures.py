@@ -32,7 +32,9 @@ def svg_figures(facts: Facts) -> dict[str, str]:
         "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
         if chart.regions
         else "",
-        "models": _svg("models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))),
+        "models": _svg(
+            "models", "Stability charts of simpler models", lambda ax: draw_models(ax, _charts_of_models(facts))
+        ),
         "frequency": _svg(
             "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2
         )
@@ -100,12 +102,15 @@ def _validity(facts: Facts, fits: Validity | None) -> str:
     return _svg("validity", "Error of simpler models by frequency", lambda ax: draw_validity(ax, fits))
 
 
-def _models(facts: Facts) -> dict[str, StabilityChart]:
+def _charts_of_models(facts: Facts) -> dict[str, StabilityChart]:
     """Charts by their labels: the device as described, then its models."""
     given = "as described" if facts.model == "full" else f"as described: {facts.model} model"
-    same = f"model-{facts.model}"
-    others = [v for v in facts.variants if v.key.startswith("model-") and v.key != same]
-    return {given: facts.chart, **{v.label: v.chart for v in others if v.chart is not None}}
+    own = f"model-{facts.model}"
+    others = [variant for variant in facts.variants if variant.key.startswith("model-") and variant.key != own]
+    return {
+        given: facts.chart,
+        **{variant.label: variant.chart for variant in others if variant.chart is not None},
+    }
 
 
 def _svg(
@@ -117,14 +122,15 @@ def _svg(
 ) -> str:
     """Both drawings of a figure with one pair of axes, as `both_drawings`.
 
+    draw                   draws into these axes
     height, narrow_height  of the wide and of the narrow one [inches]; None: the same
     """
     heights = {WIDTHS["wide"]: height, WIDTHS["narrow"]: narrow_height or height}
 
     def drawn(width: float) -> Figure:
-        made, ax = figure(width, heights[width])
+        drawing, ax = figure(width, heights[width])
         draw(ax)
-        return made
+        return drawing
 
     return both_drawings(name, description, drawn)
 
@@ -134,7 +140,8 @@ def both_drawings(name: str, description: str, draw: Callable[[float], Figure]) 
 
     The caption is the page's, below them: device, posture and computer stand once, at its head.
 
-    draw  makes the figure of a width [inches]
+    name, description  id of the <svg> elements, and what they show for those who cannot see them
+    draw               makes the figure of a width [inches]
     """
     drawings = []
     for kind, width in WIDTHS.items():

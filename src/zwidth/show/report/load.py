@@ -65,6 +65,7 @@ def change(facts: Facts) -> str:
         share = load_change(facts.point)
     except NoAnswerError as error:
         return f"What the load changes of the largest stiffness has no number: {error}."
+    # the change is a share of the stiffness without the load
     bare = quantity(facts.base.stiffness_max / (1.0 + share), "N/m")
     if abs(share) < ROUNDING:
         return f"The load does not change the largest stiffness: without it, too, it is {bare} in this posture."
@@ -101,17 +102,17 @@ def other_branch(facts: Facts) -> str:
 
 def along(facts: Facts) -> str:
     """The motions along the surface, each with its growth or decay; "" where all count for the chart."""
-    told = [_motion(motion) for motion in facts.loop.sideways_motions]
-    if not told:
+    texts = [_motion_text(motion) for motion in facts.loop.sideways_motions]
+    if not texts:
         return ""
-    stand = "a motion stands" if len(told) == 1 else f"{len(told)} motions stand"
-    each = "it" if len(told) == 1 else "one"
+    stand = "a motion stands" if len(texts) == 1 else f"{len(texts)} motions stand"
+    each = "it" if len(texts) == 1 else "one"
     return (
-        f"Along the surface, where no wall acts, {stand} apart from the chart: {each} {f'; {each} '.join(told)}."
+        f"Along the surface, where no wall acts, {stand} apart from the chart: {each} {f'; {each} '.join(texts)}."
     )
 
 
-def _motion(motion: SidewaysMotion) -> str:
+def _motion_text(motion: SidewaysMotion) -> str:
     """One motion along the surface in words: its frequency if it vibrates, and its growth or decay."""
     rate = "neither grows nor decays"
     if motion.growth_rate > 0.0:

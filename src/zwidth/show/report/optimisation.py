@@ -42,60 +42,78 @@ def optimisation_page(found: Optimisation) -> str:
             said=optimisation_sentences(found),
             before_and_after=_before_and_after(found),
             demands=_demands(found),
-            front=_front(found),
+            front=_front_table(found),
             percent=percent,
             setting="; ".join(caption_of_facts(facts_of_study(found.study), None)),
-            picture={"front": Markup(_front_drawing(found)), "charts": Markup(_charts(found))},
+            picture={"front": Markup(_front_drawing(found)), "charts": Markup(_charts_drawing(found))},
             version=__version__,
         )
 
 
-def _value(number: float, unit: str) -> str:
+def _value_text(number: float, unit: str) -> str:
     """A value with its unit; a dash where it is not finite."""
     return quantity(number, unit) if np.isfinite(number) else NONE
 
 
 def _before_and_after(found: Optimisation) -> list[tuple[str, str, str, str]]:
-    """Name, before, after and ratio of each variable and of each column, for the chosen design."""
+    """Name, before, after and ratio of each variable and of each column, as texts; [] without a front.
+
+    before   of the device as it is; after  of the design at the knee of the front
+    """
     problem, knee = found.problem, found.knee
     if knee is None:
         return []
     rows, design = [], found.design(knee)
-    for axis, own in zip(problem.variables, own_values(problem), strict=True):
+    for axis, as_is in zip(problem.variables, own_values(problem), strict=True):
         after = design[axis.key]
-        number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (own, after))
+        is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (as_is, after))
         texts = [
-            NONE if value is None else quantity(value, axis.unit) if number else axis_value_text(value)
-            for value in (own, after)
+            NONE if value is None else quantity(value, axis.unit) if is_number else axis_value_text(value)
+            for value in (as_is, after)
         ]
-        ratio = f"{after / own:.3g}" if number and own else NONE
+        ratio = f"{after / as_is:.3g}" if is_number and as_is else NONE
         rows.append((axis.key, *texts, ratio))
-    for n, one in enumerate(problem.columns):
+    for n, column in enumerate(problem.columns):
         after = float(found.values[knee, n])
         before = float("nan") if found.baseline is None else float(found.baseline.values[0, n])
         ratio = f"{after / before:.3g}" if np.isfinite(before) and before and np.isfinite(after) else NONE
-        rows.append((f"{one.title} ({one.name})", _value(before, one.unit), _value(after, one.unit), ratio))
+        rows.append(
+            (
+                f"{column.title} ({column.name})",
+                _value_text(before, column.unit),
+                _value_text(after, column.unit),
+                ratio,
+            )
+        )
     return rows  # type: ignore[return-value]
 
 
 def _demands(found: Optimisation) -> list[tuple[str, str, str]]:
-    """Text, share of designs that keep it, and the best value of each demand."""
+    """Of each demand its text, the share of designs that keep it, and the best value of a design, as texts."""
     return [
-        (one.demand.text, percent(one.kept), _value(one.best, found.problem.columns[one.demand.column].unit))
-        for one in found.demands
+        (
+            result.demand.text,
+            percent(result.kept),
+            _value_text(result.best, found.problem.columns[result.demand.column].unit),
+        )
+        for result in found.demands
     ]
 
 
-def _front(found: Optimisation) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of the front's designs."""
+def _front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
+    """Headings of a table, and a row of texts for each design of the front: its variables, then its columns."""
     problem = found.problem
-    headings = [*short_names([axis.key for axis in problem.variables]), *(one.name for one in problem.columns)]
+    headings = [
+        *short_names([axis.key for axis in problem.variables]),
+        *(column.name for column in problem.columns),
+    ]
     rows = []
     for place in range(len(found.front)):
         design = found.design(place)
         settings = [axis_value_text(design[axis.key]) for axis in problem.variables]
         values = [
-            _value(float(value), one.unit) for value, one in zip(found.values[place], problem.columns, strict=True)
+            _value_text(float(value), column.unit)
+            for value, column in zip(found.values[place], problem.columns, strict=True)
         ]
         rows.append([*settings, *values])
     return headings, rows
@@ -108,12 +126,12 @@ def _front_drawing(found: Optimisation) -> str:
     return both_drawings("front", "The front", lambda width: front_figure(found, width, 3.9))
 
 
-def _charts(found: Optimisation) -> str:
+def _charts_drawing(found: Optimisation) -> str:
     """The charts before and after where the first objective is worst; "" where neither can be drawn."""
     if found.knee is None:
         return ""
     charts = {}
-    cases: list[tuple[str, dict[str, Any], Any]] = []
+    cases: list[tuple[str, dict[str, Any], Any]] = []  # name, settings, and values in all postures, by column
     if found.baseline is not None:
         cases.append(("as it is", {}, found.baseline.cells[0]))
     cases.append((found.word, found.settings(found.knee), found.judgement.cells[found.front[found.knee]]))
@@ -126,15 +144,16 @@ def _charts(found: Optimisation) -> str:
     if not any(chart.regions for chart in charts.values()):
         return ""
 
+    # each box is K from and to, B from and to
     corners = np.array([chart.box for chart in charts.values() if chart.regions])
     low, high = corners[:, ::2].min(axis=0), corners[:, 1::2].max(axis=0)
     window = (low[0], high[0], low[1], high[1])
 
     def draw(width: float) -> Figure:
-        made, ax = figure(width, 3.7)
+        drawing, ax = figure(width, 3.7)
         with context():
             draw_models(ax, charts, window)
-        return made
+        return drawing
 
     return both_drawings("charts", "Stability charts before and after", draw)
 
@@ -148,115 +167,118 @@ def optimisation_sentences(found: Optimisation) -> list[str]:
     what a finer grid and simulation say. Where no design keeps the demands, why not."""
     tried = plural(len(found.shares), "design")
     if not len(found.front):
-        return [f"{tried} tried: {found.reason}", *_not_judged(found)]
-    said = [
-        _how_found(found, tried),
-        _gain(found),
-        *_not_judged(found),
+        return [f"{tried} tried: {found.reason}", *_unjudged_sentences(found)]
+    sentences = [
+        _how_found_text(found, tried),
+        _gain_sentence(found),
+        *_unjudged_sentences(found),
         *(premise["reason"] for premise in found.premises),
-        *_finer(found),
-        *_produced(found),
-        *_contacts(found),
+        *_finer_grid_sentences(found),
+        *_tolerance_sentences(found),
+        *_contact_sentences(found),
     ]
-    return [sentence for sentence in said if sentence]
+    return [sentence for sentence in sentences if sentence]
 
 
-def _how_found(found: Optimisation, tried: str) -> str:
+def _how_found_text(found: Optimisation, tried: str) -> str:
     """What the shown designs are of all that were tried, as a part of a sentence."""
     if len(found.problem.objectives) == 1:
         return f"the best found of {tried} tried"
     return f"{plural(len(found.front), 'design')} of the front, of {tried} tried"
 
 
-def _gain(found: Optimisation) -> str:
-    """The chosen design beside the device as it is."""
+def _gain_sentence(found: Optimisation) -> str:
+    """Sentence on the objectives of the chosen design, beside those of the device as it is."""
     problem, knee = found.problem, found.knee
     assert knee is not None
     chosen = "the best design found" if len(problem.objectives) == 1 else "the knee"
     parts = []
     for objective in problem.objectives:
-        one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
-        part = f"{one.name} {quantity(value, one.unit)}"
-        if found.baseline is not None and np.isfinite(own := float(found.baseline.values[0, objective.column])):
-            part += f" instead of {quantity(own, one.unit)}"
+        column, value = problem.columns[objective.column], float(found.values[knee, objective.column])
+        part = f"{column.name} {quantity(value, column.unit)}"
+        if found.baseline is not None and np.isfinite(before := float(found.baseline.values[0, objective.column])):
+            part += f" instead of {quantity(before, column.unit)}"
         parts.append(part)
     return f"{chosen} has {comma_list(parts)}"
 
 
-def _not_judged(found: Optimisation) -> list[str]:
+def _unjudged_sentences(found: Optimisation) -> list[str]:
     """How many designs failed or ran out of time, and why, unless that is why there is no front; and whether the
     device as it is did."""
-    said = [
-        f"{one.designs} of {plural(len(found.shares), 'design')} {WITHOUT[one.status]}"
-        + (f": {one.reason}" if one.reason else "")
-        for one in found.not_judged
-        if not one.reason or one.reason not in (found.reason or "")
+    sentences = [
+        f"{group.designs} of {plural(len(found.shares), 'design')} {WITHOUT[group.status]}"
+        + (f": {group.reason}" if group.reason else "")
+        for group in found.not_judged
+        if not group.reason or group.reason not in (found.reason or "")
     ]
-    own = [] if found.baseline is None else found.baseline.status[0].tolist()
-    return said + [f"the device as it is {verb}" for status, verb in WITHOUT.items() if status in own]
+    of_baseline = [] if found.baseline is None else found.baseline.status[0].tolist()
+    return sentences + [f"the device as it is {verb}" for status, verb in WITHOUT.items() if status in of_baseline]
 
 
-def _finer(found: Optimisation) -> list[str]:
-    """What the worst values become on a finer grid."""
+def _finer_grid_sentences(found: Optimisation) -> list[str]:
+    """What the worst values become on a finer grid of postures and directions; [] where none was computed."""
     if found.finer is None:
         return []
-    problem, said = found.problem, []
-    for n, one in enumerate(problem.columns):
+    problem, sentences = found.problem, []
+    for n, column in enumerate(problem.columns):
         fine, coarse = found.finer.values[:, n], found.values[:, n]
         if np.isnan(fine).any():
             lost = plural(int(np.isnan(fine).sum()), "design")
-            said.append(f"on a grid twice as fine {one.name} has no value in {lost}")
+            sentences.append(f"on a grid twice as fine {column.name} has no value in {lost}")
             continue
         change = float(np.max(np.abs(fine - coarse) / np.maximum(np.abs(coarse), 1e-300)))
         if change > SMALL:
-            said.append(f"on a grid twice as fine {one.name} changes by at most {percent(change)}")
+            sentences.append(f"on a grid twice as fine {column.name} changes by at most {percent(change)}")
     for demand in problem.demands:
         with np.errstate(invalid="ignore"):
             kept = margins(found.finer.values[:, demand.column], demand.bound, demand.at_least) >= 0.0
         if broken := int((~kept).sum()):
             verb = "breaks" if broken == 1 else "break"
-            said.append(f"on a grid twice as fine {plural(broken, 'design')} {verb} {demand.text}")
-    return said or ["a grid twice as fine gives the same values"]
+            sentences.append(f"on a grid twice as fine {plural(broken, 'design')} {verb} {demand.text}")
+    return sentences or ["a grid twice as fine gives the same values"]
 
 
-def _produced(found: Optimisation) -> list[str]:
-    """What tolerances make of the chosen design, and of the objectives over the front."""
+def _tolerance_sentences(found: Optimisation) -> list[str]:
+    """How many devices within tolerances of the chosen design keep the demands, and their objectives' ranges.
+
+    [] where no tolerances were drawn
+    """
     bars, knee, problem = found.bars, found.knee, found.problem
     if bars is None or knee is None:
         return []
     chosen = "the best design found" if len(problem.objectives) == 1 else "the knee"
     kept = percent(float(bars.kept[knee]))
-    said = [f"{kept} of {bars.devices} devices within the tolerances of {chosen} keep all demands"]
+    sentences = [f"{kept} of {bars.devices} devices within the tolerances of {chosen} keep all demands"]
     if not problem.demands:
-        said = [f"{bars.devices} devices were drawn within the tolerances of {chosen}"]
+        sentences = [f"{bars.devices} devices were drawn within the tolerances of {chosen}"]
     for objective in problem.objectives:
-        one = problem.columns[objective.column]
+        column = problem.columns[objective.column]
         low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
         if np.isfinite(low):
-            span = f"{quantity(low, one.unit)} to {quantity(high, one.unit)}"
-            said.append(f"90 % of them have {one.name} {span}")
-    return said
+            span = f"{quantity(low, column.unit)} to {quantity(high, column.unit)}"
+            sentences.append(f"90 % of them have {column.name} {span}")
+    return sentences
 
 
-def _contacts(found: Optimisation) -> list[str]:
-    """What nonlinear simulation says of the walls."""
-    done = [one for one in found.contacts if not one.reason]
-    said = []
+def _contact_sentences(found: Optimisation) -> list[str]:
+    """In how many designs simulation finds the wall stable, and how many could not be simulated; [] without."""
+    done = [contact for contact in found.contacts if not contact.reason]
+    sentences = []
     if done:
-        stable = sum(one.stable is True for one in done)
-        share = (
+        stable = sum(contact.stable is True for contact in done)
+        wall = (
             "the wanted wall"
             if found.study.wall.stiffness is not None
             else "a wall of 90 % of the largest stiffness"
         )
-        said.append(
-            f"{share}, simulated with friction, encoder steps and limits where the design is worst, is stable in "
+        sentences.append(
+            f"{wall}, simulated with friction, encoder steps and limits where the design is worst, is stable in "
             f"{stable} of {plural(len(done), 'design')}"
         )
-    missed = [one for one in found.contacts if one.reason]
+    missed = [contact for contact in found.contacts if contact.reason]
     if missed:
-        said.append(f"{plural(len(missed), 'design')} could not be simulated: {missed[0].reason}")
-    return said
+        sentences.append(f"{plural(len(missed), 'design')} could not be simulated: {missed[0].reason}")
+    return sentences
 
 
 def short_names(paths: Sequence[str]) -> list[str]:

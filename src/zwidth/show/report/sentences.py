@@ -139,11 +139,15 @@ def limit(facts: Facts) -> str:
 
 
 def _cause(facts: Facts, best: Variant) -> str:
-    """What a single change takes away, in words: the cause that limits the device."""
+    """What the best single change takes away, in words: the cause that limits the device."""
     controller = facts.loop.controller
     flexible = frequency_list(facts)
     if best.key == "rigid-drives":
-        what = f"the flexibility of {_gives(facts)}" if facts.device.mechanism is not None else "its flexibility"
+        what = (
+            f"the flexibility of {_flexible_parts(facts)}"
+            if facts.device.mechanism is not None
+            else "its flexibility"
+        )
         return f"{what}, at {join_words(flexible)}" if flexible else what
     if best.key == "no-delay":
         return f"the delay of {delay_name(controller)}"
@@ -158,7 +162,7 @@ def _cause(facts: Facts, best: Variant) -> str:
     return "its low structural damping" if flexible else "its low friction"
 
 
-def _gives(facts: Facts) -> str:
+def _flexible_parts(facts: Facts) -> str:
     """What of a mechanism is not rigid: "the drives", or "drives and links"."""
     mechanism = facts.device.mechanism
     return "drives and links" if mechanism is not None and mechanism.flexible else "the drives"
@@ -169,14 +173,16 @@ def frequency_list(facts: Facts) -> list[str]:
     the lowest, and the highest of the rest."""
     flexible = [f for f in facts.natural_frequencies.tolist() if f > 0.0]
     shown = flexible if len(flexible) <= MOST_FREQUENCIES + 2 else flexible[:MOST_FREQUENCIES]
-    rest = len(flexible) - len(shown)
-    return [*map(hertz, shown), *([f"{rest} more up to {hertz(flexible[-1])}"] if rest else [])]
+    unshown = len(flexible) - len(shown)
+    return [*map(hertz, shown), *([f"{unshown} more up to {hertz(flexible[-1])}"] if unshown else [])]
 
 
 def _change_text(facts: Facts, best: Variant) -> str:
     """A single change in words, as a condition: "with ...", "without ..."."""
     rigid = (
-        f"rigid {_gives(facts)}".replace("the ", "") if facts.device.mechanism is not None else "a rigid structure"
+        f"rigid {_flexible_parts(facts)}".replace("the ", "")
+        if facts.device.mechanism is not None
+        else "a rigid structure"
     )
     return {
         "rigid-drives": f"with {rigid}, which cannot be built,",
@@ -193,7 +199,7 @@ def _reached(variant: Variant) -> str:
 
 
 def _one_sample_delay(facts: Facts) -> str:
-    """The effect of one sample of delay, for a device that has less."""
+    """The effect of one sample of delay as a part of a sentence, for a device that has less; "" for another."""
     late = find_variant(facts.variants, "one-sample")
     if late.chart is None or facts.loop.controller.delay >= 1.0 or not facts.renders:
         return ""
@@ -212,11 +218,18 @@ def next_best(facts: Facts) -> str:
     if best is None:
         return ""
     ideal = best.key in IDEAL
-    rest = [v for v in facts.variants if v.key in REMEDIES and v.chart is not None and v is not best]
-    rest = sorted((v for v in rest if not (ideal and v.key in IDEAL)), key=lambda v: -v.stiffness_max)
-    if not rest or not rest[0].stiffness_max > LEAST_GAIN * facts.base.stiffness_max:
+    candidates = [
+        variant
+        for variant in facts.variants
+        if variant.key in REMEDIES and variant.chart is not None and variant is not best
+    ]
+    candidates = sorted(
+        (variant for variant in candidates if not (ideal and variant.key in IDEAL)),
+        key=lambda variant: -variant.stiffness_max,
+    )
+    if not candidates or not candidates[0].stiffness_max > LEAST_GAIN * facts.base.stiffness_max:
         return f"None of the changes tried that can be made gains {ONE_PERCENT}." if ideal else ""
-    second = rest[0]
+    second = candidates[0]
     if ideal:
         return f"The best of the changes tried that can be made, {second.label}, would reach {_reached(second)}."
     note = " (which can only be approached)" if second.key in IDEAL else ""
@@ -234,7 +247,7 @@ def unobserved(facts: Facts) -> str:
     names = listed_names(facts.chart.unobserved_modes)
     if not names or facts.runs_away:  # the warning has named them
         return ""
-    the = "" if names[0][0].isdigit() else "the "
+    the = "" if names[0][0].isdigit() else "the "  # a name such as "2 rigid motions" takes no article
     many = len(names) > 1 or not the
     direction = " in this direction" if facts.posture is not None else ""
     text = f"{the}{join_words(names)} {'are' if many else 'is'} not affected by a wall{direction}"
@@ -251,6 +264,7 @@ def left_out(facts: Facts) -> str:
 def outside(facts: Facts) -> str:
     """Sentence on vibrations inside and outside the edge of the stable set."""
     nyquist = 0.5 / facts.loop.period
+    # a straight part of the edge, at frequency 0: a real eigenvalue passes through 1
     straight = [arc for arc in facts.chart.boundary if np.all(arc.frequency <= 1e-9 * nyquist)]
     text = "Inside the edge the motion comes to rest; outside, an oscillation builds up"
     if not straight:
@@ -279,7 +293,7 @@ def models(facts: Facts) -> str:
 
 
 def difference(ratio: float) -> str:
-    """A ratio in words: "2.000 % above", "as", "16.00 times"."""
+    """A ratio in words before "the device": "2.000 % above", "just as", "16.00 times that of"."""
     if ratio >= 3.0:
         return f"{number(ratio)} times that of"
     if abs(ratio - 1.0) < 5e-4:
@@ -301,7 +315,7 @@ def decay(facts: Facts) -> str:
 
 
 def _comes_to_rest(wall: FastestDecay, facts: Facts) -> str:
-    """The wall and how long its slowest motion takes."""
+    """The wall and how long its slowest motion takes to shrink to a tenth, as a part of a sentence."""
     time = quantity(tenfold_time(wall.spectral_radius, facts.loop.period), "s")
     numbers = f"{quantity(wall.stiffness, 'N/m')} and {quantity(wall.damping, 'N s/m')}"
     return f"a wall of {numbers} comes to rest fastest: a tenth is left after {time}"
@@ -376,17 +390,17 @@ def _sign_towards(change: str, path: str) -> float:
 
 
 def _obstacle(facts: Facts, best: Variant) -> str:
-    """Why the change cannot be made; "" where it can."""
+    """Why the change cannot be made, as a part of a sentence; "" where it can."""
     if best.key == "no-delay":
         return "a delay can be shortened but not removed"
     if best.key == "rigid-drives":
-        rigid = _gives(facts).removeprefix("the ") if facts.device.mechanism is not None else "structure"
+        rigid = _flexible_parts(facts).removeprefix("the ") if facts.device.mechanism is not None else "structure"
         return f"no {rigid} {'is' if rigid == 'structure' else 'are'} rigid"
     return ""
 
 
 def _small_step(facts: Facts, best: Variant) -> str:
-    """What a first step towards the change gains or loses; "" where it is not known."""
+    """What 1 % towards the change gains or loses, as a part of a sentence; "" where it is not known."""
     drives = facts.device.mechanism is not None
     stiffer = f"{ONE_PERCENT} stiffer drives" if drives else f"a {ONE_PERCENT} stiffer structure"
     step = {
@@ -396,6 +410,7 @@ def _small_step(facts: Facts, best: Variant) -> str:
         "no-filter": f"a {ONE_PERCENT} faster filter",
         "twice-damping": f"{ONE_PERCENT} more {best.label.removeprefix('twice the ')}",
     }.get(best.key)
+    # all numbers that belong to the change move by 1 % at once, so their sensitivities add
     numbers = [(_sign_towards(best.key, n.path), n) for n in facts.sensitivities.numbers if n.value != 0.0]
     gains = [sign * n.logarithmic for sign, n in numbers if sign]
     if step is None or not gains or not isfinite(gain := sum(gains)):
@@ -448,7 +463,7 @@ def which_model(facts: Facts) -> str:
     if isfinite(validity.first_natural):
         times = number(highest / validity.first_natural)
         text += f", {times} times its first natural frequency of {hertz(validity.first_natural)}"
-    good = [f"{fit.label} {_where(fit, validity)}" for fit in fits if fit.valid_ranges]
+    good = [f"{fit.label} {_where_valid(fit, validity)}" for fit in fits if fit.valid_ranges]
     bad = [fit.label for fit in fits if not fit.valid_ranges]
     within = f"within {100.0 * validity.tolerance:g}{SPACE}% in stiffness, damping and frequency"
     if not good:
@@ -457,24 +472,24 @@ def which_model(facts: Facts) -> str:
     return f"{text}. Simpler models that agree with it {within}: {'; '.join([*good, *nowhere])}."
 
 
-def _where(fit: ModelFit, validity: Validity) -> str:
+def _where_valid(fit: ModelFit, validity: Validity) -> str:
     """The ranges in which a model agrees: "everywhere", "below 17.60 Hz (17.37 % of that)", ..."""
     if fit.everywhere:
         return "everywhere"
-    return join_words([_range(interval, validity) for interval in fit.valid_ranges])
+    return join_words([_range_text(interval, validity) for interval in fit.valid_ranges])
 
 
-def _range(interval: Interval, validity: Validity) -> str:
-    """A range of frequencies in words, as `_where`: ends of the edge are not named."""
+def _range_text(interval: Interval, validity: Validity) -> str:
+    """A range of frequencies in words, as `_where_valid`: ends of the edge are not named."""
     low, high = interval
     if low <= float(validity.frequency[0]):
-        return f"below {hertz(high)}{_share(high, validity)}"
+        return f"below {hertz(high)}{_share_text(high, validity)}"
     if high >= float(validity.frequency[-1]):
-        return f"above {hertz(low)}{_share(low, validity)}"
+        return f"above {hertz(low)}{_share_text(low, validity)}"
     return f"between {hertz(low)} and {hertz(high)}"
 
 
-def _share(frequency: float, validity: Validity) -> str:
+def _share_text(frequency: float, validity: Validity) -> str:
     """A frequency as a share of the first natural one, in brackets; "" where there is none."""
     if not isfinite(validity.first_natural):
         return ""

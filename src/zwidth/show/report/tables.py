@@ -18,16 +18,16 @@ Row = tuple[str, ...]
 
 def parameters(facts: Facts) -> list[Row]:
     """Name, symbol and value of each effective parameter that this device has."""
-    e = facts.effective
+    effective = facts.effective
     flexible = sentences.frequency_list(facts)
     zero = f"0{SPACE}Hz"
     rigid = int((facts.natural_frequencies == 0.0).sum())
     modes = ", ".join([*([zero if rigid == 1 else f"{zero} ({rigid} rigid motions)"] if rigid else []), *flexible])
     rows = [
-        ("link-side mass", "m₁", quantity(float(e.link_side_mass), "kg")),
-        ("motor-side mass", "m₂", quantity(float(e.motor_side_mass), "kg")),
-        ("mass with rigid drives", "m", quantity(float(e.rigid_mass), "kg")),
-        ("stiffness between the two sides", "k", quantity(float(e.stiffness), "N/m")),
+        ("link-side mass", "m₁", quantity(float(effective.link_side_mass), "kg")),
+        ("motor-side mass", "m₂", quantity(float(effective.motor_side_mass), "kg")),
+        ("mass with rigid drives", "m", quantity(float(effective.rigid_mass), "kg")),
+        ("stiffness between the two sides", "k", quantity(float(effective.stiffness), "N/m")),
         ("natural frequencies", "f", modes or UNKNOWN),
     ]
     return [row for row in rows if row[-1] != UNKNOWN]
@@ -41,41 +41,49 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
     base = facts.base.stiffness_max
     return [
         (
-            f"{v.label} (ideal)" if v.key in sentences.IDEAL else v.label,
-            quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else NONE,
-            f"{number(v.stiffness_max / base)}{SPACE}×" if base > 0.0 else UNKNOWN,
-            quantity(v.damping, "N s/m"),
-            ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
-            quantity(v.area, "N^2 s/m^2"),
+            f"{variant.label} (ideal)" if variant.key in sentences.IDEAL else variant.label,
+            quantity(variant.stiffness_max, "N/m") if variant.stiffness_max > 0.0 else NONE,
+            f"{number(variant.stiffness_max / base)}{SPACE}×" if base > 0.0 else UNKNOWN,
+            quantity(variant.damping, "N s/m"),
+            ", ".join(sentences.hertz(f) for f in variant.frequencies) or UNKNOWN,
+            quantity(variant.area, "N^2 s/m^2"),
         )
-        for v in variants
-        if v.chart is not None
+        for variant in variants
+        if variant.chart is not None
     ]
 
 
 def uncharted_variants(variants: tuple[Variant, ...]) -> list[Row]:
     """Labels and reason of the variants without a chart, those of one reason together."""
     reasons: dict[str, list[str]] = {}
-    for v in variants:
-        if v.chart is None:
+    for variant in variants:
+        if variant.chart is None:
             # what follows a semicolon is advice on asking for this model
-            reasons.setdefault(v.reason.split("; ")[0], []).append(v.label)
+            reasons.setdefault(variant.reason.split("; ")[0], []).append(variant.label)
     return [(sentences.join_words(labels), reason) for reason, labels in reasons.items()]
 
 
 def single_changes(facts: Facts) -> tuple[Variant, ...]:
     """The device as described and its single changes."""
-    return tuple(v for v in facts.variants if not v.key.startswith("model-"))
+    return tuple(variant for variant in facts.variants if not variant.key.startswith("model-"))
 
 
 def simpler_models(facts: Facts) -> tuple[Variant, ...]:
-    """The device as described and its models."""
-    same = {f"model-{facts.model}"}
-    return (facts.base, *(v for v in facts.variants if v.key.startswith("model-") and v.key not in same))
+    """The device as described, then the variants by other models than its own."""
+    own = {f"model-{facts.model}"}
+    return (
+        facts.base,
+        *(variant for variant in facts.variants if variant.key.startswith("model-") and variant.key not in own),
+    )
 
 
 def bounds(facts: Facts, *, holding: bool) -> list[dict[str, Any]]:
-    """The published conditions that apply, or those that do not, and this report's answer first; [] for none."""
+    """Rows on the published conditions, and one on this report's answer before them; [] for no condition.
+
+    holding  True: the conditions that apply; False: those that do not
+    Returns  texts by `name`, `source`, `kind`, `stiffness`, `ratio` to this report's, and sentences on what is
+             `unmet`
+    """
     exact = facts.base.stiffness_max
     chosen = [bound for bound in facts.bounds if bound.holds == holding]
     report = {
@@ -95,20 +103,20 @@ def bounds(facts: Facts, *, holding: bool) -> list[dict[str, Any]]:
             "ratio": f"{number(bound.stiffness_max / exact)}{SPACE}×"
             if exact > 0.0 and bound.stiffness_max > 0.0
             else UNKNOWN,
-            "unmet": (*bound.violated, *_needs(bound)),
+            "unmet": (*bound.violated, *_lacking_sentences(bound)),
         }
         for bound in chosen
     ]
     return [report, *rows] if rows else []
 
 
-def _needs(bound: Bound) -> list[str]:
-    """A sentence on the numbers that a condition takes and the device does not have."""
+def _lacking_sentences(bound: Bound) -> list[str]:
+    """A sentence on the numbers that a condition takes and the device does not have; [] where it has all."""
     return [f"It needs {sentences.join_words(bound.lacking)}."] if bound.lacking else []
 
 
 def _wall_text(stiffness: float, damping: float) -> str:
-    """A largest stiffness and its damping, where there are such."""
+    """A largest stiffness [N/m] and its damping [N s/m] in words: "none" for 0, without a damping that is nan."""
     if stiffness == 0.0:
         return NONE
     wall = quantity(stiffness, "N/m")
@@ -118,7 +126,7 @@ def _wall_text(stiffness: float, damping: float) -> str:
 def document(facts: Facts) -> dict[str, Any]:
     """All numbers of the report by the keys of the command line's --json; None for what is not known. Call it
     while the units of what is rendered are spoken."""
-    chart, e = facts.chart, facts.effective
+    chart, effective = facts.chart, facts.effective
     fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
     about = {
         "device": facts.device.name,
@@ -129,12 +137,12 @@ def document(facts: Facts) -> dict[str, Any]:
         "model": facts.model,
     }
     values = {
-        "link_side_mass_kg": float(e.link_side_mass),
-        "motor_side_mass_kg": float(e.motor_side_mass),
-        "rigid_mass_kg": float(e.rigid_mass),
-        "stiffness_N_per_m": float(e.stiffness),
+        "link_side_mass_kg": float(effective.link_side_mass),
+        "motor_side_mass_kg": float(effective.motor_side_mass),
+        "rigid_mass_kg": float(effective.rigid_mass),
+        "stiffness_N_per_m": float(effective.stiffness),
         "natural_frequencies_Hz": facts.natural_frequencies.tolist(),
-        **_walls(facts.base),
+        **_chart_values(facts.base),
         "damping_max_Ns_per_m": chart.damping_max,
         "fastest_decay": fastest and fastest.document(),
         "fastest_decay_in_first_quadrant": buildable and buildable.document(),
@@ -144,14 +152,16 @@ def document(facts: Facts) -> dict[str, Any]:
         "static_stiffness_limit_kind": facts.felt and facts.felt.limit_kind,
         "sensitivities": _sensitivity_values(facts),
         "models": facts.validity and facts.validity.document(),
-        **_load(facts),
+        **_load_values(facts),
         "bending": facts.bending and facts.bending.document(),
-        "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
+        "what_if": [
+            {"key": variant.key, "label": variant.label, **_chart_values(variant)} for variant in facts.variants
+        ],
         "bounds": _bound_values(facts),
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
     numbers = keys_of_moments(values) if facts.point.turns else values
-    return {key: _known(value) for key, value in {**about, **numbers, **reason}.items()}
+    return {key: _nan_to_none(value) for key, value in {**about, **numbers, **reason}.items()}
 
 
 def _sensitivity_values(facts: Facts) -> list[dict[str, Any]]:
@@ -183,7 +193,7 @@ def _bound_values(facts: Facts) -> list[dict[str, Any]]:
     ]
 
 
-def _load(facts: Facts) -> dict[str, Any]:
+def _load_values(facts: Facts) -> dict[str, Any]:
     """The equilibrium, the motions along the surface and the charts under other pushes; {} without load."""
     path, found = facts.load_path, facts.point
     if path is None:
@@ -195,7 +205,7 @@ def _load(facts: Facts) -> dict[str, Any]:
     }
 
 
-def _walls(variant: Variant) -> dict[str, Any]:
+def _chart_values(variant: Variant) -> dict[str, Any]:
     """Numbers of the chart of a variant by key and unit, with the reason where it has none."""
     frequencies = list(variant.frequencies)
     return {
@@ -208,10 +218,10 @@ def _walls(variant: Variant) -> dict[str, Any]:
     }
 
 
-def _known(value: Any) -> Any:
+def _nan_to_none(value: Any) -> Any:
     """The value with None for each nan in it; an infinite stiffness stays infinite."""
     if isinstance(value, Mapping):
-        return {key: _known(inner) for key, inner in value.items()}
+        return {key: _nan_to_none(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_known(inner) for inner in value]
+        return [_nan_to_none(inner) for inner in value]
     return None if isinstance(value, float) and value != value else value
