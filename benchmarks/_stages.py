@@ -31,7 +31,7 @@ STAGES = (
     ("all, from the plant to the stiffest wall", False),
 )
 REPEATS = 10
-_goes_on, _has_stiffer_line = peak_search._goes_on, peak_search._has_stiffer_line
+_edge_goes_on, _has_stiffer_line = peak_search._edge_goes_on, peak_search._has_stiffer_line
 _has_stiffer_turn = peak_search._has_stiffer_turn
 
 
@@ -66,7 +66,7 @@ def _repeater(stage: int) -> Any:
                 elif stage == 6:
                     flag_quadrant(memory)
                 elif stage == 7:
-                    _goes_on(memory)
+                    _edge_goes_on(memory)
                 elif stage == 8:
                     _has_stiffer_line(memory)
                 elif stage == 9:

@@ -49,7 +49,7 @@ def test_the_phase_along_the_circle_counts_what_polynomials_count():
         rate = 10.0 ** rng.uniform(2.3, 4.3)
         tracer = Tracer(Loop(random_plant(rng, rate, DAMPED), Controller(1.0 / rate, float(rng.integers(0, 4)))))
         assert not tracer.is_high_degree
-        thetas, terms = tracer._circle
+        thetas, terms = tracer._circle_samples
         K, B, edge = decided_trace(tracer, thetas)
         walls = np.column_stack([K, B])
         flags = phase_flags(tracer.circle, thetas, terms, tracer.degree, walls, thetas, 0)

@@ -258,7 +258,7 @@ def test_a_chart_that_is_in_doubt_once_it_is_drawn_is_undecided(monkeypatch):
     def doubted(*_):
         raise ChartError("walls on the edge are off the circle")
 
-    monkeypatch.setattr("zwidth.chart.loop_edge._judged", doubted)
+    monkeypatch.setattr("zwidth.chart.loop_edge._judged_or_retraced", doubted)
     ran = run_command("chart", TWO_MASS, "--json")
     assert ran.code == 1
     assert ran.document["decided"] is False

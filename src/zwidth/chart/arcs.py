@@ -177,7 +177,10 @@ class Arcs:
         return np.flatnonzero(np.isin(self.kind, CURVED)).tolist()
 
     def crossings(self, component: int, level: float = 0.0) -> tuple[Ints, Floats]:
-        """Numbers (k,) of the straight arcs whose K or B passes a level, and the walls (k, 2) where they do."""
+        """Numbers (k,) of the straight arcs whose K or B passes a level, and the walls (k, 2) where they do.
+
+        component  STIFFNESS or DAMPING
+        """
         a, b = self.first[:, component] - level, self.last[:, component] - level
         crossed = np.flatnonzero(~np.isin(self.kind, CURVED) & (a * b < 0.0))
         share = a[crossed] / (a[crossed] - b[crossed])
@@ -238,6 +241,7 @@ def outline(arcs: list[ArcPoints]) -> Floats:
 
     An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.
     """
+    # K and B of all arcs, one after the other, and of the first point again
     closed = [[*(arc[axis] for arc in arcs), arcs[0][axis][:1]] for axis in (1, 2)]
     walls = np.array([np.concatenate(parts) for parts in closed])
     last = np.cumsum([len(K) for _, K, _ in arcs]) - 1

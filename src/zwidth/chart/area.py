@@ -108,6 +108,7 @@ def straight_integral(K0: float, B0: float, K1: float, B1: float) -> float:
             low, high = (max(low, share), high) if a < 0.0 else (low, min(high, share))
     middle = 0.5 * (low + high)
     K, B = K0 + middle * (K1 - K0), B0 + middle * (B1 - B0)
+    # K is linear along it: its mean is that at the middle
     return K * (B1 - B0) * (high - low) if low < high and K > 0.0 and B > 0.0 else 0.0
 
 
@@ -115,11 +116,12 @@ def straight_integral(K0: float, B0: float, K1: float, B1: float) -> float:
 def end_value(
     circle: CircleFactors, of: int, values: Floats, t: Floats, n: int, last: bool
 ) -> tuple[float, float]:
-    """Where, and with which value, the first or last of n walls of a curve counts for changes of sign: at its own
+    """The t at which the first or last of n walls of a curve counts for changes of sign, and K or B there: its own
     t; but if it lies on an axis, or at t = 0 or inf, drawn in towards its neighbour by END_MARGIN of the step.
 
     of      OF_K or OF_B
     values  K or B of the walls
+    last    True: of the last wall; False: of the first
     """
     end, neighbour = (n - 1, n - 2) if last else (0, 1)
     largest = 0.0
@@ -145,11 +147,14 @@ def end_value(
 def curve_integral(
     circle: CircleFactors, area: AreaMemory, lanes: Floats, t: Floats, K: Floats, B: Floats, n: int
 ) -> float:
-    """Integral of K dB over the part with K > 0 and B > 0 of the curve through its first n walls.
+    """Integral of K dB over the part with K > 0 and B > 0 of a curve given by n walls.
+
+    t, K, B  of the walls, in the order of the walk, at least n;   lanes  working memory of `wall_samples`
 
     It is split where the curve crosses an axis, so that each panel lies within the quadrant or outside.
     """
     total = 0.0
+    # where the panel begins; and where the interval does for changes of the sign of K, and of that of B
     from_t, from_K, from_B, intervals = t[0], K[0], B[0], 0
     K_t, K_value = end_value(circle, OF_K, K, t, n, False)
     B_t, B_value = end_value(circle, OF_B, B, t, n, False)
@@ -198,13 +203,13 @@ def _panel(
     """
     if a == b:
         return 0.0
-    stack, total = area.panels, 0.0
+    stack, total = area.panels, 0.0  # t, K and B at both ends of panels that wait, the next one last
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3], stack[0, 4], stack[0, 5] = a, Ka, Ba, b, Kb, Bb
     depth, halvings = 0, 0
     while depth >= 0:
         row = stack[depth]
         a, Ka, Ba, b, Kb, Bb = row[0], row[1], row[2], row[3], row[4], row[5]
-        far = a + b > 2.0
+        far = a + b > 2.0  # the middle of the panel is beyond t = 1
         middle = _between(a, b, 0.0, far)
         Km, Bm = wall_on_circle(circle, middle)
         if halvings == 0 and not (Km > 0.0 and Bm > 0.0):  # the ends may lie on an axis
@@ -247,7 +252,10 @@ def _rule(
     Bb: float,
     far: bool,
 ) -> float:
-    """Integral of K dB over one panel from t = a to b by the rule; far: nodes lie evenly in 1/t."""
+    """Integral of K dB over one panel from the wall Ka, Ba at t = a to Kb, Bb at b by the rule.
+
+    far  True: the rule's points are taken in 1/t; False: in t
+    """
     rule, t, K, B = area.rule, area.walls[0], area.walls[1], area.walls[2]
     n, total = rule.shape[1], 0.0
     for i in range(1, n - 1):
@@ -328,6 +336,7 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
     best, corners = stiffest_index(K, B, 1e-10 * stiffness_scale), 2 * len(arcs)
     if best < 0:
         return None
+    # of walls the first n are the arcs' last ones, the next n those with which the arcs after them begin
     if best < corners:
         last = best % len(arcs)
         after = int(arcs.next_arc[last])

@@ -53,7 +53,8 @@ class StabilityChart(Chart):
         return self.loop.unobserved_modes
 
     def document(self) -> dict[str, Any]:
-        """The chart as numbers and lists by key; under load with equilibrium and the other branch."""
+        """The chart as numbers and lists by key; under load also the equilibrium and the chart of the other
+        branch."""
         own = super().document()
         if self.loop.plant.apart is not None:
             own["sideways_motions"] = [motion.document() for motion in self.loop.sideways_motions]

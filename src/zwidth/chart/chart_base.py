@@ -136,7 +136,7 @@ class Chart(Result, ABC):
         return f"{len(self.regions)} stable region{'' if len(self.regions) == 1 else 's'}"
 
     def _numbers(self) -> list[str]:
-        """Largest stiffness, largest damping and area as lines of text; with those added at most four."""
+        """Largest stiffness, largest damping and area as lines of text; subclasses may add one."""
         stiffest = "none: no stable wall has K > 0 and B >= 0"
         if self.frequencies_at_stiffness_max:
             frequencies = " and ".join(f"{frequency:.6g}" for frequency in self.frequencies_at_stiffness_max)

@@ -11,7 +11,19 @@ from numpy.typing import NDArray
 from zwidth.arrays import Floats
 from zwidth.chart.chart_numbers import read_edge
 from zwidth.chart.decay_search import search_fastest
-from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING, MOST_SAMPLES, EdgeMemory, edge_memory
+from zwidth.chart.edge_memory import (
+    AREA,
+    DOUBTFUL,
+    FOUND,
+    LARGEST_DAMPING,
+    MOST_SAMPLES,
+    PEAK_B,
+    PEAK_K,
+    PEAK_PARTNER,
+    PEAK_T,
+    EdgeMemory,
+    edge_memory,
+)
 from zwidth.chart.edge_samples import degree_of, fill_loop
 from zwidth.chart.peak_search import search_peak
 from zwidth.chart.wall_samples import MOST_DEGREE
@@ -68,14 +80,15 @@ def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS, radius: Floats | No
         """Fill `out` for loops first to last - 1, in the thread's own memory, which its first call makes."""
         if not hasattr(own, "memory"):
             own.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
-        _several(loops, own.memory, what, radii, out, first, last)
+        _fill_several(loops, own.memory, what, radii, out, first, last)
 
     in_chunks(several, len(loops.rows))
     return out
 
 
 def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -> tuple[int, int]:
-    """Status, and status of the fastest decay, of the first loop on |z| = radius.
+    """Status of the edge, and status of the fastest decay, of the first loop on |z| = radius: FOUND, NO_WALL or
+    DOUBTFUL, as it stays for what the mask does not ask for.
 
     What is not DOUBTFUL is left in `memory`: its edge, if the mask has WHOLE_EDGE and not DECAY, and `fastest`.
     """
@@ -84,7 +97,7 @@ def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -
     out: ChartNumbers = _OWN.numbers
     out.status[0] = out.decay_status[0] = DOUBTFUL
     _OWN.radius[0] = radius
-    _several(loops, memory, what, _OWN.radius, out, 0, 1)
+    _fill_several(loops, memory, what, _OWN.radius, out, 0, 1)
     return int(out.status[0]), int(out.decay_status[0])
 
 
@@ -99,15 +112,15 @@ def memory_of(loops: LoopTable) -> EdgeMemory:
 
 def empty_numbers(count: int) -> ChartNumbers:
     """The numbers of so many loops before any is computed: all DOUBTFUL and nan."""
-    status = (np.full(count, DOUBTFUL, dtype=np.uint8) for _ in range(2))
+    statuses = (np.full(count, DOUBTFUL, dtype=np.uint8) for _ in range(2))
     numbers = (np.full(shape, np.nan) for shape in (count, count, (count, 2), count, count, (count, 3)))
-    one, other = status
+    status, decay_status = statuses
     stiffness, damping, angles, largest_damping, area, fastest = numbers
-    return ChartNumbers(one, stiffness, damping, angles, largest_damping, area, other, fastest)
+    return ChartNumbers(status, stiffness, damping, angles, largest_damping, area, decay_status, fastest)
 
 
 @compiled
-def _several(
+def _fill_several(
     loops: LoopTable, memory: EdgeMemory, what: int, radii: Floats, out: ChartNumbers, first: int, last: int
 ) -> None:
     """Fill `out` for loops first to last - 1, each on the circle |z| = its radius."""
@@ -120,7 +133,8 @@ def _several(
 def fill_numbers(
     loops: LoopTable, i: int, memory: EdgeMemory, what: int, radius: float, out: ChartNumbers
 ) -> None:
-    """The numbers of loop i that the mask asks for; none if it has no sections or its degree is too high.
+    """Fill `out` for loop i with the numbers that the mask `what` asks for; none if it has no sections or its
+    degree is too high.
 
     memory  as a loop before this one has left it, or with -1 as its computer
     """
@@ -137,8 +151,8 @@ def fill_numbers(
             out.largest_damping[i], out.area[i] = memory.numbers[LARGEST_DAMPING], memory.numbers[AREA]
     out.status[i] = status
     if status == FOUND:
-        out.stiffness[i], out.damping[i] = memory.peak[0], memory.peak[1]
-        one, other = 2.0 * np.arctan(memory.peak[2]), 2.0 * np.arctan(memory.peak[3])
+        out.stiffness[i], out.damping[i] = memory.peak[PEAK_K], memory.peak[PEAK_B]
+        one, other = 2.0 * np.arctan(memory.peak[PEAK_T]), 2.0 * np.arctan(memory.peak[PEAK_PARTNER])
         out.angles[i, 0], out.angles[i, 1] = min(one, other), max(one, other)
     if what & DECAY:
         out.decay_status[i] = search_fastest(loops, i, memory)

@@ -116,19 +116,22 @@ def _memory_of_thread() -> Callable[[Any, int], Any]:
     several types.
     """
     known: dict[str, Any] = {}
-    exec(f"def own(memory, thread):\n    return {_rows(EdgeMemory, 'memory', known)}", known)
+    exec(f"def own(memory, thread):\n    return {_text_of_rows(EdgeMemory, 'memory', known)}", known)
     own: Callable[[Any, int], Any] = known["own"]
     return own
 
 
-def _rows(kind: type, place: str, known: dict[str, Any]) -> str:
-    """Python text that makes a tuple of this kind of one thread's rows of the arrays in the variable `place`."""
+def _text_of_rows(kind: type, place: str, known: dict[str, Any]) -> str:
+    """Python text that makes a tuple of this kind of one thread's rows of the arrays in the variable `place`.
+
+    known  gets the kinds of tuples that the text names
+    """
     known[kind.__name__] = kind
     parts = []
     for name, inner in get_type_hints(kind).items():
         field = f"{place}.{name}"
         if hasattr(inner, "_fields"):
-            parts.append(_rows(inner, field, known))
+            parts.append(_text_of_rows(inner, field, known))
         else:
             parts.append(field if field in SHARED else f"{field}[thread]")
     return f"{kind.__name__}({', '.join(parts)})"
@@ -158,7 +161,7 @@ def function_of_gpu(kernel: Any) -> Any:
         known["complex"] = _complex
         return cuda.jit(copy, device=True)
     inlined = bool(kernel.targetoptions.get("forceinline"))
-    made = _device_function()(copy, {"device": True, "opt": True, "forceinline": inlined})
+    made = _class_of_device_functions()(copy, {"device": True, "opt": True, "forceinline": inlined})
     made.apart = bool(getattr(kernel, "apart", False))
     return made
 
@@ -208,7 +211,7 @@ def _numpy_of_gpu() -> ModuleType:
 
 
 @cache
-def _device_function() -> Any:
+def _class_of_device_functions() -> Any:
     """The class of functions of the GPU; made late, since the simulator has nothing to derive it from."""
     from numba.cuda.dispatcher import CUDADispatcher
 

@@ -18,12 +18,19 @@ from zwidth.chart.edge_arcs import SAME_CORNER, add_line_arcs, fill_line_pieces,
 from zwidth.chart.edge_memory import (
     ARCS,
     AREA,
+    B_ROW,
     DOUBTFUL,
     FOUND,
+    K_ROW,
     LARGEST_DAMPING,
     NO_WALL,
+    PEAK_B,
+    PEAK_K,
+    PEAK_PARTNER,
+    PEAK_T,
     SAMPLES,
     STOPS,
+    T_ROW,
     EdgeMemory,
 )
 from zwidth.chart.edge_samples import (
@@ -49,23 +56,23 @@ RING_OPEN, PEAK_IS_NO_EDGE, ROUNDS = 4, 5, 4
 
 @compiled_lean
 def fill_nodes(memory: EdgeMemory, k: int) -> int:
-    """The t, K and B of an arc of the curve, its ends and the samples between, into `picked` from first to last;
-    their number."""
+    """Put t, K and B of arc k, a piece of the curve, into rows of `picked`: of its ends and of the samples
+    between, from first to last. Returns their number."""
     arcs, samples, nodes = memory.arcs, memory.samples, memory.picked
     low, high = arcs.samples[k, 0], arcs.samples[k, 1]
-    nodes[0, 0], nodes[1, 0], nodes[2, 0] = arcs.start[k], arcs.first[k, 0], arcs.first[k, 1]
+    nodes[T_ROW, 0], nodes[K_ROW, 0], nodes[B_ROW, 0] = arcs.start[k], arcs.first[k, 0], arcs.first[k, 1]
     n = 1
     for i in range(high - low):
         at = low + i if arcs.start[k] < arcs.end[k] else high - 1 - i
-        nodes[0, n], nodes[1, n], nodes[2, n] = samples.t[at], samples.K[at], samples.B[at]
+        nodes[T_ROW, n], nodes[K_ROW, n], nodes[B_ROW, n] = samples.t[at], samples.K[at], samples.B[at]
         n += 1
-    nodes[0, n], nodes[1, n], nodes[2, n] = arcs.end[k], arcs.last[k, 0], arcs.last[k, 1]
+    nodes[T_ROW, n], nodes[K_ROW, n], nodes[B_ROW, n] = arcs.end[k], arcs.last[k, 0], arcs.last[k, 1]
     return n + 1
 
 
 @compiled_lean
 def read_numbers(memory: EdgeMemory) -> bool:
-    """The numbers of the rings of arcs into `numbers`; False where one is in doubt.
+    """Put the numbers of the rings of arcs into `numbers`; False where one is in doubt.
 
     The stiffest wall, with t of both roots on the circle there, goes into `peak`.
     """
@@ -74,7 +81,7 @@ def read_numbers(memory: EdgeMemory) -> bool:
         peak[c] = 0.0
     memory.counts[STOPS] = 0
     numbers[LARGEST_DAMPING], numbers[AREA] = 0.0, 0.0
-    memory.stops[0], memory.counts[STOPS] = 0.0, 1
+    memory.stops[0], memory.counts[STOPS] = 0.0, 1  # dampings from B = 0 on
     scale = _largest_stiffness_of_edge(memory)
     if scale == 0.0:
         return True
@@ -93,7 +100,7 @@ def read_numbers(memory: EdgeMemory) -> bool:
         read = _read_curve(memory, k, scale) if arcs.kind[k] == PAIR else _read_line(memory, k, scale)
         if not read:
             return False
-    numbers[AREA] = max(numbers[AREA], 0.0) if peak[0] > 0.0 else 0.0
+    numbers[AREA] = max(numbers[AREA], 0.0) if peak[PEAK_K] > 0.0 else 0.0
     return _read_damping(memory, scale)
 
 
@@ -113,8 +120,8 @@ def _largest_stiffness_of_edge(memory: EdgeMemory) -> float:
 def _keep_peak(memory: EdgeMemory, least: float, K: float, B: float, t: float, partner: float) -> None:
     """Put a wall with K > least, B >= 0 into `peak` if stiffer than that there; t, partner: of its two roots."""
     peak = memory.peak
-    if least < K and B >= 0.0 and is_stiffer(K, B, peak[0], peak[1]):
-        peak[0], peak[1], peak[2], peak[3] = K, B, t, partner
+    if least < K and B >= 0.0 and is_stiffer(K, B, peak[PEAK_K], peak[PEAK_B]):
+        peak[PEAK_K], peak[PEAK_B], peak[PEAK_T], peak[PEAK_PARTNER] = K, B, t, partner
 
 
 @compiled_lean
@@ -131,7 +138,10 @@ def _add_stop(memory: EdgeMemory, B: float) -> bool:
 
 @compiled_lean
 def _read_line(memory: EdgeMemory, k: int, scale: float) -> bool:
-    """Add what straight arc k has: area, a crossing of B = 0, a meeting with K = 0; False where memory is full."""
+    """Add what straight arc k has: area, a crossing of B = 0, a meeting with K = 0; False where memory is full.
+
+    scale  largest |K| of the edge [N/m]
+    """
     arcs = memory.arcs
     K0, B0, K1, B1 = arcs.first[k, 0], arcs.first[k, 1], arcs.last[k, 0], arcs.last[k, 1]
     memory.numbers[AREA] += straight_integral(K0, B0, K1, B1)
@@ -143,11 +153,15 @@ def _read_line(memory: EdgeMemory, k: int, scale: float) -> bool:
 
 @compiled_lean
 def _read_curve(memory: EdgeMemory, k: int, scale: float) -> bool:
-    """Add what arc k of the curve has: area, stiffest wall, meetings with K = 0; False where memory is full."""
+    """Add what arc k of the curve has: area, stiffest wall, meetings with K = 0; False where memory is full.
+
+    scale  largest |K| of the edge [N/m]
+    """
     circle, nodes, area = memory.circle, memory.picked, memory.area
     n = fill_nodes(memory, k)
-    t, K, B = nodes[0], nodes[1], nodes[2]
+    t, K, B = nodes[T_ROW], nodes[K_ROW], nodes[B_ROW]
     memory.numbers[AREA] += curve_integral(circle, area, memory.lanes, t, K, B, n)
+    # where the interval begins for changes of the sign of K, and for those of B: the same but at an arc's ends
     K_t, K_value = end_value(circle, OF_K, K, t, n, False)
     B_t, B_value = end_value(circle, OF_B, B, t, n, False)
     for i in range(1, n):
@@ -178,7 +192,7 @@ def _read_curve(memory: EdgeMemory, k: int, scale: float) -> bool:
 def _may_rise(memory: EdgeMemory, n: int, i: int) -> bool:
     """Whether K can be larger between nodes i - 1 and i than the largest stiffness found: a parabola rises above
     its ends by an eighth of its second difference at most, and four times that is allowed."""
-    K, bend = memory.picked[1], 0.0
+    K, bend = memory.picked[K_ROW], 0.0
     rise = K[i] - K[i - 1]
     if i > 1:
         bend = max(bend, abs(rise - (K[i - 1] - K[i - 2])))
@@ -186,13 +200,16 @@ def _may_rise(memory: EdgeMemory, n: int, i: int) -> bool:
         bend = max(bend, abs(K[i + 1] - K[i] - rise))
     if n == 2:
         return True
-    return bool(max(K[i - 1], K[i]) + 0.5 * bend >= memory.peak[0])
+    return bool(max(K[i - 1], K[i]) + 0.5 * bend >= memory.peak[PEAK_K])
 
 
 @compiled_lean
 def _read_damping(memory: EdgeMemory, scale: float) -> bool:
-    """The supremum of B >= 0 that is stable for all sufficiently small K > 0, 0 if there is none; False where
-    rounding hides whether an interval of K = 0+ is stable."""
+    """Put the supremum of B >= 0 that is stable for all sufficiently small K > 0 into `numbers`, 0 if there is
+    none; False where rounding hides whether an interval of K = 0+ is stable.
+
+    scale  largest |K| of the edge [N/m]
+    """
     stops, n = memory.stops, memory.counts[STOPS]
     # insertion sort: there are few stops, and nothing is allocated
     for k in range(1, n):
@@ -220,23 +237,26 @@ def _read_damping(memory: EdgeMemory, scale: float) -> bool:
 
 @compiled_lean
 def read_edge(memory: EdgeMemory) -> int:
-    """The edge of the loop whose polynomials stand, with its numbers, if nothing on the way is in doubt."""
+    """Fill in the edge of the loop whose polynomials are in memory, with its numbers and its stiffest wall.
+
+    Returns FOUND; NO_WALL where no wall with K > 0, B >= 0 is stable; DOUBTFUL where anything is in doubt
+    """
     if not fill_curve(memory, SHARE, LONGEST, NEAR_END):
         return DOUBTFUL
     for _ in range(ROUNDS):
-        status = _read_flags(memory)
+        status = _read_samples(memory)
         if status == RING_OPEN and add_samples_between_corners(memory):
             continue
-        if status == PEAK_IS_NO_EDGE and add_sample(memory, memory.peak[2]):
+        if status == PEAK_IS_NO_EDGE and add_sample(memory, memory.peak[PEAK_T]):
             continue
         break
     return DOUBTFUL if status in (RING_OPEN, PEAK_IS_NO_EDGE) else status
 
 
 @compiled_apart
-def _read_flags(memory: EdgeMemory) -> int:
-    """`read_edge` from the curve's samples; RING_OPEN where an arc is missing, PEAK_IS_NO_EDGE where the stiffest
-    wall of the arcs is none of the set."""
+def _read_samples(memory: EdgeMemory) -> int:
+    """`read_edge` from the curve's samples, whose flags are not known yet; RING_OPEN where an arc is missing,
+    PEAK_IS_NO_EDGE where the stiffest wall of the arcs is none of the set."""
     flag_all(memory)
     for i in range(memory.counts[SAMPLES]):
         if memory.samples.flag[i] == HIDDEN:
@@ -251,8 +271,8 @@ def _read_flags(memory: EdgeMemory) -> int:
         return DOUBTFUL
     peak = memory.peak
     # a maximum of K, or a crossing of B = 0, past which another branch may go
-    if peak[2] == peak[3] and 0.0 < peak[2] < np.inf:
-        flag = edge_flag(memory, peak[2])
+    if peak[PEAK_T] == peak[PEAK_PARTNER] and 0.0 < peak[PEAK_T] < np.inf:
+        flag = edge_flag(memory, peak[PEAK_T])
         if flag != EDGE:
             return PEAK_IS_NO_EDGE if flag == NO_EDGE else DOUBTFUL
-    return FOUND if peak[0] > 0.0 else NO_WALL
+    return FOUND if peak[PEAK_K] > 0.0 else NO_WALL

@@ -75,8 +75,8 @@ def feature_memory(most: int, window: int) -> Features:
 
 
 @compiled_lean
-def _add(out: Features, re: float, im: float) -> None:
-    """Add a point s unless it lies below the real axis, or is z = infinity."""
+def _add_point(out: Features, re: float, im: float) -> None:
+    """Add the singular point s = re + i im unless it lies below the real axis, or is z = infinity."""
     n = out.counts[0]
     if im < -1e-12 or n >= len(out.points) or not np.isfinite(re + im):
         return
@@ -87,37 +87,37 @@ def _add(out: Features, re: float, im: float) -> None:
 
 
 @compiled_lean
-def _add_roots(out: Features, a0: float, a1: float, a2: float) -> None:
+def _add_roots_of_quadratic(out: Features, a0: float, a1: float, a2: float) -> None:
     """Add the roots of a0 + a1 s + a2 s^2, which may be of lower degree."""
     if abs(a2) <= 1e-300:
         if a1 != 0.0:
-            _add(out, -a0 / a1, 0.0)
+            _add_point(out, -a0 / a1, 0.0)
         return
     mean = -0.5 * a1 / a2
     gap = mean * mean - a0 / a2
     if gap < 0.0:
-        _add(out, mean, np.sqrt(-gap))
+        _add_point(out, mean, np.sqrt(-gap))
         return
     # the root without cancellation, and the other from the product a0 / a2
     large = mean - np.sqrt(gap) if mean <= 0.0 else mean + np.sqrt(gap)
-    _add(out, large, 0.0)
-    _add(out, a0 / (a2 * large) if large != 0.0 else 0.0, 0.0)
+    _add_point(out, large, 0.0)
+    _add_point(out, a0 / (a2 * large) if large != 0.0 else 0.0, 0.0)
 
 
 @compiled_lean
-def _add_zeros(out: Features, p: Floats) -> None:
+def _add_roots_of_polynomial(out: Features, p: Floats) -> None:
     """Add the roots of a polynomial in ascending powers of s, to a thousandth of their size."""
     n = len(p) - 1
     if n > 3:
         spread_roots(out.roots[:n])
         find_roots(p, out.roots[:n], 1e-3)
         for k in range(n):
-            _add(out, out.roots[k].real, out.roots[k].imag)
+            _add_point(out, out.roots[k].real, out.roots[k].imag)
         return
     a0, a1, a2 = p[0], p[1] if n > 0 else 0.0, p[2] if n > 1 else 0.0
     if n == 3:
         root = real_root(p)
-        _add(out, root, 0.0)
+        _add_point(out, root, 0.0)
         # the other two: p divided by s - root, from the end at which no digits are lost
         if abs(root) < 1.0:
             a2, a1 = p[3], p[2] + p[3] * root
@@ -125,18 +125,19 @@ def _add_zeros(out: Features, p: Floats) -> None:
         else:
             a0 = -p[0] / root
             a1, a2 = (a0 - p[1]) / root, p[3]
-    _add_roots(out, a0, a1, a2)
+    _add_roots_of_quadratic(out, a0, a1, a2)
 
 
 @compiled_apart
 def fill_computer_features(f: CircleFactors, out: Features) -> None:
     """Put into `out` the singular points that come from filters and velocity estimate, whatever the plant."""
     out.counts[0] = 0
+    # rows of factors: order, numerator (3), denominator (3)
     for k in range(f.sizes[FORCE]):
-        _add_roots(out, f.force[k, 1], f.force[k, 2], f.force[k, 3])
-        _add_roots(out, f.force[k, 4], f.force[k, 5], f.force[k, 6])
+        _add_roots_of_quadratic(out, f.force[k, 1], f.force[k, 2], f.force[k, 3])
+        _add_roots_of_quadratic(out, f.force[k, 4], f.force[k, 5], f.force[k, 6])
     for k in range(f.sizes[VELOCITY]):
-        _add_roots(out, f.velocity[k, 4], f.velocity[k, 5], f.velocity[k, 6])
+        _add_roots_of_quadratic(out, f.velocity[k, 4], f.velocity[k, 5], f.velocity[k, 6])
     # a single factor of first order is nowhere in phase: Im w is a multiple of sin theta
     if f.sizes[WINDOW] > 1 or f.sizes[VELOCITY] > 1 or (f.sizes[VELOCITY] == 1 and f.velocity[0, 0] != 1.0):
         count = PHASES + PHASES_PER_SAMPLE * f.sizes[WINDOW]
@@ -144,9 +145,9 @@ def fill_computer_features(f: CircleFactors, out: Features) -> None:
         for k in range(1, count - 1):
             t = np.tan(0.5 * np.pi * k / (count - 1))
             cc, ss, sc = half_angle(t)
-            across = velocity_on_circle(f, cc, ss, sc)[0].imag
+            across = velocity_on_circle(f, cc, ss, sc)[0].imag  # of the sign of Im w: w is real where it changes
             if before * across < 0.0:
-                _add(out, 0.0, before_t + before / (before - across) * (t - before_t))
+                _add_point(out, 0.0, before_t + before / (before - across) * (t - before_t))
             before, before_t = across, t
     out.counts[1] = out.counts[0]
 
@@ -155,21 +156,22 @@ def fill_computer_features(f: CircleFactors, out: Features) -> None:
 def fill_features(f: CircleFactors, polynomials: LoopPolynomials, out: Features) -> None:
     """Add to `out`, which has the computer's singular points, the plant's: poles and zeros of P."""
     out.counts[0] = out.counts[1]
-    for k in range(f.sizes[SECTIONS]):
-        _add_roots(out, f.plant[k, 0], f.plant[k, 1], f.plant[k, 2])
+    for k in range(f.sizes[SECTIONS]):  # the sections' denominators
+        _add_roots_of_quadratic(out, f.plant[k, 0], f.plant[k, 1], f.plant[k, 2])
     top, bottom, zeros = polynomials.degrees[ZEROS], 0, polynomials.parts[ZEROS]
     while top > 0 and abs(zeros[top]) <= 1e-300:
         top -= 1
     while bottom < top and abs(zeros[bottom]) <= 1e-300:
         bottom += 1
     if bottom > 0:
-        _add(out, 0.0, 0.0)
-    # one root is s = 1 (z infinite), where a sampled plant has no direct passage
+        _add_point(out, 0.0, 0.0)
+    # P's numerator divided by its power of s, and by s - 1: one root is s = 1 (z infinite), where a sampled plant
+    # has no direct passage
     rest = polynomials.parts[SPARE]
     rest[top] = zeros[top]
     for k in range(top - 1, bottom, -1):
         rest[k] = rest[k + 1] + zeros[k]
-    _add_zeros(out, rest[bottom + 1 : top + 1])
+    _add_roots_of_polynomial(out, rest[bottom + 1 : top + 1])
     _fill_distances(f.radius[0], out)
 
 
@@ -222,12 +224,13 @@ def fill_samples(
             active[0, m], active[1, m] = features.points[k].real, features.points[k].imag
             active[2, m], active[3, m] = features.scales[0, k], features.scales[1, k]
             m += 1
+    # an angle theta near 0 is t = theta/2, one near pi is t = 2/(pi - theta)
     t, end, count = 0.5 * near_end * first, 2.0 / (near_end * last), 0
     while t < end and count < len(out):
         out[count] = t
         count += 1
         cc = 1.0 / (1.0 + t * t)
-        near = 4.0 * cc * min(1.0, t * t)
+        near = 4.0 * cc * min(1.0, t * t)  # square of the distance to the nearer of z = rho and z = -rho, rho 1
         for k in range(m):
             x, y = active[0, k], active[1, k] - t
             away = max((x * x + y * y) * active[2, k] * cc, active[3, k])
@@ -269,7 +272,7 @@ def _samples_beside_points(points: Complexes, found: Features, share: float, lon
     """`fill_samples` on the unit circle for given points z, which go into `found`."""
     for z in points:
         s = divide(z - 1.0, z + 1.0)
-        _add(found, s.real, s.imag)
+        _add_point(found, s.real, s.imag)
     _fill_distances(1.0, found)
     return fill_samples(found, 1.0, share, longest, NEAR_END, out)
 

@@ -35,7 +35,8 @@ HALVINGS: Final = 36  # leave a step of rounding size
 
 @compiled_lean
 def fill_corners(memory: EdgeMemory) -> int:
-    """All corners between samples that are edges and samples that are none; the number of those left OPEN."""
+    """Fill in all corners between samples that are edges and samples that are none. Returns how many are left
+    OPEN."""
     samples, left_open = memory.samples, 0
     for i in range(memory.counts[SAMPLES] - 1):
         if (samples.flag[i] == EDGE) != (samples.flag[i + 1] == EDGE):
@@ -48,7 +49,8 @@ def fill_corners(memory: EdgeMemory) -> int:
 
 @compiled_lean
 def _fill_from_partner(memory: EdgeMemory, i: int) -> bool:
-    """Settle an open corner between samples i and i + 1 if the other branch's corner is known."""
+    """Settle an open corner between samples i and i + 1 from that of the branch that crosses there: whether that
+    is known."""
     samples = memory.samples
     for k in range(memory.counts[SAMPLES] - 1):
         if samples.corner[k] == SETTLED and samples.t[i] < samples.corner_partner[k] < samples.t[i + 1]:
@@ -68,7 +70,8 @@ def _copy_corner(memory: EdgeMemory, k: int, i: int) -> None:
 
 @compiled_apart
 def fill_corner(memory: EdgeMemory, i: int) -> int:
-    """The corner between samples i and i + 1, of which one is an edge, unless it is known; its state."""
+    """Fill in the corner between samples i and i + 1, of which one is an edge, unless it is known. Returns its
+    state, SETTLED or OPEN."""
     samples, circle = memory.samples, memory.circle
     if samples.corner[i] != NONE:
         return int(samples.corner[i])
@@ -117,7 +120,7 @@ def _corner_between(memory: EdgeMemory, i: int, j: int) -> tuple[float, float, i
     circle, samples = memory.circle, memory.samples
     t, K, B = samples.t, samples.K, samples.B
     low, high = min(t[i], t[j]), max(t[i], t[j])
-    corner, partner, found = t[j], 0.0, False
+    corner, partner, found = t[j], 0.0, False  # the nearest to sample i so far
     for root in (0.0, np.inf):
         line = line_of(memory, root)
         at_i, at_j = line[0] + line[1] * K[i] + line[2] * B[i], line[0] + line[1] * K[j] + line[2] * B[j]
@@ -126,6 +129,7 @@ def _corner_between(memory: EdgeMemory, i: int, j: int) -> tuple[float, float, i
             nearer = abs(crossing - t[i]) < abs(corner - t[i])
             if nearer and _flag_changes(memory, crossing, t[i], t[j]):
                 corner, partner, found = crossing, root, True
+    # pieces k, k + 1 of the curve whose chord dK_other, dB_other crosses the chord dK, dB from i to j
     dK, dB = K[j] - K[i], B[j] - B[i]
     for k in range(memory.counts[SAMPLES] - 1):
         if k in (i - 1, i, j - 1, j):
@@ -135,8 +139,8 @@ def _corner_between(memory: EdgeMemory, i: int, j: int) -> tuple[float, float, i
         if not off * next_off < 0.0:
             continue
         # chords k, k + 1 and i, j cross, or nearly
-        eK, eB = K[k + 1] - K[k], B[k + 1] - B[k]
-        share = ((K[k] - K[i]) * eB - (B[k] - B[i]) * eK) / (dK * eB - dB * eK)
+        dK_other, dB_other = K[k + 1] - K[k], B[k + 1] - B[k]
+        share = ((K[k] - K[i]) * dB_other - (B[k] - B[i]) * dK_other) / (dK * dB_other - dB * dK_other)
         if not -0.2 <= share <= 1.2:
             continue
         other_share = off / (off - next_off)
@@ -160,15 +164,18 @@ def _flag_changes(memory: EdgeMemory, at: float, on: float, off: float) -> bool:
 
 @compiled_lean
 def _corner_by_halving(memory: EdgeMemory, on: float, off: float) -> tuple[float, float, int]:
-    """`_corner_between` by halving on the flag, where no sampled piece of the curve crosses there."""
+    """`_corner_between` by halving on the flag, where no sampled piece of the curve crosses there.
+
+    on, off  t of the edge sample, and of the one that is none
+    """
     circle, room = memory.circle, memory.room
-    N, edge, none = circle.sizes[DEGREE], on, off
+    N, edge, beyond = circle.sizes[DEGREE], on, off
     for _ in range(HALVINGS):
-        middle = 0.5 * (edge + none)
+        middle = 0.5 * (edge + beyond)
         if edge_flag(memory, middle) == EDGE:
             edge = middle
         else:
-            none = middle
+            beyond = middle
     K, B = wall_on_circle(circle, edge)
     if N < 4:
         return edge, 0.0, OPEN
@@ -191,8 +198,8 @@ def _corner_by_halving(memory: EdgeMemory, on: float, off: float) -> tuple[float
 
 @compiled_apart
 def solve_crossing(circle: CircleFactors, one: float, other: float) -> tuple[float, float, bool]:
-    """Newton for wall(one) = wall(other), angles given as t = tan(theta/2), from close by; False if it wanders off
-    or does not settle."""
+    """The two t = tan(theta/2) at which the curve has the same wall, by Newton's method from t = one and t = other
+    close by; and whether it settled: False if it wanders off, or if both t are one."""
     a, b = one, other
     settled = False
     for _ in range(30):
@@ -222,8 +229,8 @@ def solve_crossing(circle: CircleFactors, one: float, other: float) -> tuple[flo
 def better_conditioned(circle: CircleFactors, one: float, other: float) -> float:
     """Of the two t of a corner the one on whose branch the wall moves less with the angle's last digits."""
     _, _, dK, dB = wall_with_slopes(circle, one)
-    _, _, eK, eB = wall_with_slopes(circle, other)
+    _, _, dK2, dB2 = wall_with_slopes(circle, other)
     # each in shares of the corner's slopes together, so that K and B count alike
-    first = (abs(dK) / (abs(dK) + abs(eK)) + abs(dB) / (abs(dB) + abs(eB))) * np.arctan(one)
-    second = (abs(eK) / (abs(dK) + abs(eK)) + abs(eB) / (abs(dB) + abs(eB))) * np.arctan(other)
+    first = (abs(dK) / (abs(dK) + abs(dK2)) + abs(dB) / (abs(dB) + abs(dB2))) * np.arctan(one)
+    second = (abs(dK2) / (abs(dK) + abs(dK2)) + abs(dB2) / (abs(dB) + abs(dB2))) * np.arctan(other)
     return one if not first > second else other

@@ -34,8 +34,12 @@ def wall_at(circle: CircleFactors, theta: float) -> tuple[float, float, float, f
 
 
 @compiled_lean
-def _value(circle: CircleFactors, of: int, line: Line, t: float) -> float:
-    """K, B, dK/dtheta, dB/dtheta or a + s K + v B at t = tan(theta/2)."""
+def _value_along_curve(circle: CircleFactors, of: int, line: Line, t: float) -> float:
+    """The one of K, B, dK/dtheta, dB/dtheta and a + s K + v B that `of` names (OF_K to OF_LINE), at t =
+    tan(theta/2).
+
+    line  a, s, v
+    """
     if of in (OF_SLOPE, OF_SLOPE_B):
         return wall_with_slopes(circle, t)[2 + of - OF_SLOPE]
     K, B = wall_on_circle(circle, t)
@@ -46,16 +50,17 @@ def _value(circle: CircleFactors, of: int, line: Line, t: float) -> float:
 
 @compiled_apart
 def zero_between(circle: CircleFactors, of: int, line: Line, low: float, high: float) -> float:
-    """The t = tan(theta/2) between two others at which K, B, dK/dtheta or a + s K + v B changes sign, to rounding.
+    """The t = tan(theta/2) between two others at which K, B, a slope or a + s K + v B changes sign, to rounding.
 
     By false position, the retained end's value halved (Illinois), with a bisection wherever three steps have not
     halved the bracket: at a pole, where signs change too, nothing else is left.
 
-    line  a, s, v
+    of    which of these: OF_K, OF_B, OF_SLOPE, OF_SLOPE_B or OF_LINE
+    line  a, s, v for OF_LINE; else NO_LINE
     """
     a, b = low, high
-    at_a, at_b = _value(circle, of, line, a), _value(circle, of, line, b)
-    last, width = 0, abs(b - a)
+    at_a, at_b = _value_along_curve(circle, of, line, a), _value_along_curve(circle, of, line, b)
+    last, width = 0, abs(b - a)  # last: which end was replaced, a 1 or b -1
     for step in range(100):
         least = 4e-16 * max(abs(a), abs(b))
         if abs(b - a) <= least:
@@ -72,7 +77,7 @@ def zero_between(circle: CircleFactors, of: int, line: Line, low: float, high: f
                 x = _middle(a, b)
             if not min(a, b) < x < max(a, b):
                 break
-        value = _value(circle, of, line, x)
+        value = _value_along_curve(circle, of, line, x)
         if value == 0.0:
             return x
         if (value > 0.0) == (at_a > 0.0):
@@ -115,7 +120,10 @@ def walls(circle: CircleFactors, thetas: Floats) -> tuple[Floats, Floats]:
 @compiled
 def trace(circle: CircleFactors, polynomials: Floats, t: Floats) -> tuple[Floats, Floats, NDArray[np.int8]]:
     """K, B and whether the wall edges the stable set (1 yes, -1 no, 0 lost in rounding) at ascending t =
-    tan(theta/2)."""
+    tan(theta/2), all (n,).
+
+    polynomials  (5, N + 1)  `LoopPolynomials.coefficients` of the loop's own degree N
+    """
     n, N = len(t), polynomials.shape[1] - 1
     K, B, flags = np.empty(n), np.empty(n), np.empty(n, dtype=np.int8)
     work = np.empty(LANES_SIZE)

@@ -21,6 +21,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.edge_memory import NONE, SAMPLES, EdgeMemory
+from zwidth.chart.loop_polynomials import A, S, V
 from zwidth.chart.real_root_lines import line_of, sum_of_coefficients
 from zwidth.chart.wall_samples import UNKNOWN
 from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
@@ -40,7 +41,7 @@ def refine_samples(memory: EdgeMemory) -> bool:
     """Halve intervals between samples until none hides a loop or a change of sign; False where memory is full."""
     samples, most, doubtful, n = memory.samples, sum_of_coefficients(memory), 0, memory.counts[SAMPLES]
     clear, number = memory.picked[0], memory.picked_number
-    _find_clear(memory, clear)
+    _mark_clear_intervals(memory, clear)
     for i in range(n - 1):
         if clear[i] == 0.0:
             number[doubtful] = i
@@ -55,20 +56,23 @@ def refine_samples(memory: EdgeMemory) -> bool:
                 continue
             if memory.counts[SAMPLES] + 1 >= len(samples.t):
                 return False
-            _insert(memory, i + 1, np.sqrt(low * high))
+            _insert_sample(memory, i + 1, np.sqrt(low * high))
     return True
 
 
 @compiled_lean
-def _find_clear(memory: EdgeMemory, clear: Floats) -> None:
-    """1 for the intervals that plainly hide nothing, else 0: a first test without branches, of many at once."""
+def _mark_clear_intervals(memory: EdgeMemory, clear: Floats) -> None:
+    """Set `clear` to 1 for the intervals after samples that plainly hide nothing, else to 0: a first test without
+    branches, of many at once."""
     t, K, B = memory.samples.t, memory.samples.K, memory.samples.B
     slope_K, slope_B = memory.samples.slope_K, memory.samples.slope_B
+    # both lines of real roots, a + s K + v B = 0 and b + p K + q B = 0
     a, s, v = line_of(memory, 0.0)
     b, p, q = line_of(memory, np.inf)
     for i in range(memory.counts[SAMPLES] - 1):
         # slopes are per ln t; this is its step, to the third order
         step = 2.0 * (t[i + 1] - t[i]) / (t[i + 1] + t[i])
+        # slopes of K and B at both ends, times the step
         uK, wK, uB, wB = step * slope_K[i], step * slope_K[i + 1], step * slope_B[i], step * slope_B[i + 1]
         K0, K3, B0, B3 = K[i], K[i + 1], B[i], B[i + 1]
         # control points of the cubic through both ends with their slopes, drawn out by STRAY: its hull holds it
@@ -89,7 +93,7 @@ def _find_clear(memory: EdgeMemory, clear: Floats) -> None:
 
 
 @compiled_lean
-def _insert(memory: EdgeMemory, i: int, t: float) -> None:
+def _insert_sample(memory: EdgeMemory, i: int, t: float) -> None:
     """Insert a new sample at t as number i."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     for k in range(n, i, -1):
@@ -111,6 +115,7 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
     """
     samples, j = memory.samples, i + 1
     K, B, step = samples.K, samples.B, 2.0 * (samples.t[j] - samples.t[i]) / (samples.t[j] + samples.t[i])
+    # slopes at both ends, times the step of ln t, and the chord
     uK, uB = step * samples.slope_K[i], step * samples.slope_B[i]
     wK, wB = step * samples.slope_K[j], step * samples.slope_B[j]
     cK, cB = K[j] - K[i], B[j] - B[i]
@@ -119,10 +124,11 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
     far = max(abs(uK), abs(wK), abs(cK)) > ROUNDING_STEP * abs(K[i])
     if not far and max(abs(uB), abs(wB), abs(cB)) <= ROUNDING_STEP * abs(B[i]):
         return False
+    # control points of each coefficient of p along the cubic; `most` bounds those of a stable wall
     returns, N = False, memory.circle.sizes[DEGREE]
     polynomials = memory.polynomials.coefficients
     for c in range(N + 1):
-        a, s, v = polynomials[0, c], polynomials[1, c], polynomials[2, c]
+        a, s, v = polynomials[A, c], polynomials[S, c], polynomials[V, c]
         before, after = a + s * K[i] + v * B[i], a + s * K[j] + v * B[j]
         rise, next_rise = STRAY / 3.0 * (s * uK + v * uB), STRAY / 3.0 * (s * wK + v * wB)
         low = min(min(before, after), min(before + rise, after - next_rise))
@@ -135,6 +141,7 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
             returns = returns or (line and before * after > 0.0 and low < 0.0 < high)
     if returns or _may_return(K[i], uK, wK, K[j]) or _may_return(B[i], uB, wB, B[j]):
         return True
+    # the cubic's slope goes from u over the control point m to w
     mK, mB = 1.5 * cK - 0.5 * (uK + wK), 1.5 * cB - 0.5 * (uB + wB)
     if _of_one_sign(uK, mK, wK):
         return False
@@ -152,7 +159,7 @@ def _may_return(first: float, rise: float, next_rise: float, last: float) -> boo
 
 @compiled_inline
 def _of_one_sign(u: float, m: float, w: float) -> bool:
-    """Whether a quadratic with these control points, the slope of a cubic, is of one sign."""
+    """Whether a quadratic with control points u, m and w (Bernstein's), the slope of a cubic, is of one sign."""
     if u > 0.0:
         return w > 0.0 and m > MARGIN * max(u, w)
     return u < 0.0 and w < 0.0 and m < MARGIN * min(u, w)
@@ -160,10 +167,14 @@ def _of_one_sign(u: float, m: float, w: float) -> bool:
 
 @compiled_lean
 def _point_one_way(uK: float, uB: float, mK: float, mB: float, wK: float, wB: float) -> bool:
-    """Whether slopes with these control points are known to point into one half plane."""
+    """Whether all slopes of a cubic are known to point into one half plane: True if certain.
+
+    uK, uB; mK, mB; wK, wB  the control points of the slopes of K and B: at the first end, between, at the last end
+    """
     over_K = 1.0 / max(abs(uK), abs(mK), abs(wK), 1e-300)
     over_B = 1.0 / max(abs(uB), abs(mB), abs(wB), 1e-300)
     uK, mK, wK, uB, mB, wB = uK * over_K, mK * over_K, wK * over_K, uB * over_B, mB * over_B, wB * over_B
+    # K and B in shares of their largest slope; u, m, w are the lengths
     u, m, w = np.sqrt(uK * uK + uB * uB), np.sqrt(mK * mK + mB * mB), np.sqrt(wK * wK + wB * wB)
     least = MARGIN * max(u, m, w)
     # the mean slope; and the mean of the three directions

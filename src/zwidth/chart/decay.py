@@ -63,7 +63,7 @@ def fastest_decay(tracer: Tracer, outlines: Callable[[], list[Floats]]) -> Faste
     if status != DOUBTFUL:
         found = FastestDecay(*memory.fastest.tolist()) if status == FOUND else None
         return found if found and found.spectral_radius < tracer.radius else None
-    best = _fastest(tracer, outlines(), ALL)
+    best = _fastest_by_searches(tracer, outlines(), ALL)
     return _refine_at_double_root(tracer, best, ALL) if best else None
 
 
@@ -77,29 +77,30 @@ def fastest_decay_in_first_quadrant(
     """
     if of_all is None or min(of_all.stiffness, of_all.damping) >= 0.0:
         return of_all
-    best = _fastest(tracer, outlines(), QUADRANT)
-    return _on_axes(tracer.loop, _refine_at_double_root(tracer, best, QUADRANT)) if best else None
+    best = _fastest_by_searches(tracer, outlines(), QUADRANT)
+    return _moved_to_axes(tracer.loop, _refine_at_double_root(tracer, best, QUADRANT)) if best else None
 
 
-def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDecay | None:
+def _fastest_by_searches(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDecay | None:
     """The fastest-decaying wall with K, B >= least by simplex searches, repeated until no faster wall is found."""
     best: FastestDecay | None = None
     for outline in outlines:
-        best = _search(tracer, outline, least, best)
+        best = _search_cell(tracer, outline, least, best)
     for share in FASTER:
         for _ in range(ROUNDS):
             radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + share) if best else 0.0
             if not 0.0 < radius < 1.0:
                 break
             walls = _edge_walls(Tracer(tracer.loop, radius))
-            previous, best = best, _search(tracer, walls, least, best) if len(walls) else best
+            previous, best = best, _search_cell(tracer, walls, least, best) if len(walls) else best
             if best is previous:
                 break
     return best
 
 
 def _refine_at_double_root(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
-    """The wall with a double real root near the best one if it decays as fast or faster, else the best one."""
+    """The wall with a double real root near the best one, and K, B >= least, if it decays as fast or faster, else
+    the best one."""
     for reach in REACHES if tracer.degree > 2 else ():
         away = reach * (1.0 - best.spectral_radius)
         low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)
@@ -125,8 +126,9 @@ def _decay_by_eigenvalues(loop: Loop, K: float, B: float) -> FastestDecay:
     return FastestDecay(K, B, float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max()))
 
 
-def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
-    """The same wall with K or B exactly zero where that decays as fast to within rounding."""
+def _moved_to_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
+    """The best wall, or that with its K, its B or both exactly zero where that decays as fast to within
+    rounding."""
     for K, B in ((0.0, 0.0), (0.0, best.damping), (best.stiffness, 0.0)):
         candidate = _decay_by_eigenvalues(loop, K, B)
         if candidate.spectral_radius <= best.spectral_radius + 1e-12:
@@ -134,7 +136,7 @@ def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
     return best
 
 
-def _search(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay | None) -> FastestDecay | None:
+def _search_cell(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay | None) -> FastestDecay | None:
     """Search a cell among walls with K, B >= least, from the best middles between points of its outline.
 
     Returns  the faster-decaying of the wall found and `best`
@@ -175,18 +177,20 @@ def _in_quadrant(outline: Floats) -> Floats:
 def _best_on_axis(tracer: Tracer, points: Floats, axis: int) -> Floats:
     """The wall (1, 2) of smallest spectral radius on an axis, as far as the points go; K (0) or B (1) is zero."""
     farthest = points[:, 1 - axis].max()
-    t = AXIS_SHARES * farthest
+    places = AXIS_SHARES * farthest
 
-    def radii(t: Floats) -> Floats:
+    def radii(places: Floats) -> Floats:
         """Spectral radii (n,) of the walls at places t (n,) on the axis."""
-        zero = np.zeros(len(t))
-        return scatter_values(tracer.polynomials, tracer.radius, *((zero, t) if axis == 0 else (t, zero)))
+        zero = np.zeros(len(places))
+        return scatter_values(
+            tracer.polynomials, tracer.radius, *((zero, places) if axis == 0 else (places, zero))
+        )
 
-    rho = radii(t)
+    rho = radii(places)
     lowest = np.flatnonzero((rho <= np.append(rho[1:], np.inf)) & (rho <= np.append(np.inf, rho[:-1])))
-    best = t[np.argmin(rho)], rho.min()
+    best = places[np.argmin(rho)], rho.min()
     for k in lowest[np.argsort(rho[lowest])][:VALLEYS]:
-        low, high = t[max(k - 1, 0)], t[min(k + 1, len(t) - 1)]
+        low, high = places[max(k - 1, 0)], places[min(k + 1, len(places) - 1)]
         for _ in range(ZOOMS):
             closer = np.linspace(low, high, ZOOMED)
             radii_closer = radii(closer)

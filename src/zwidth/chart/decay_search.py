@@ -14,8 +14,21 @@ import numpy as np
 
 from zwidth.arrays import Complexes, Floats
 from zwidth.chart.circle_sampling import NEAR_END
-from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL, SAMPLES, STARTS, EdgeMemory
+from zwidth.chart.edge_memory import (
+    B_ROW,
+    DOUBTFUL,
+    FASTEST_B,
+    FASTEST_K,
+    FASTEST_RADIUS,
+    FOUND,
+    K_ROW,
+    NO_WALL,
+    SAMPLES,
+    STARTS,
+    EdgeMemory,
+)
 from zwidth.chart.edge_samples import LONGEST, SHARE, fill_curve, fill_loop, fill_without_singularities, flag_all
+from zwidth.chart.loop_polynomials import A, S, V
 from zwidth.chart.real_root_lines import curve_end
 from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.wall_samples import EDGE, HIDDEN
@@ -37,22 +50,22 @@ PICKS: Final = 14  # walls of an edge between which starts are tried
 
 @compiled_apart
 def search_fastest(loops: LoopTable, i: int, memory: EdgeMemory) -> int:
-    """FOUND, with the fastest-decaying wall's K, B and spectral radius in `fastest`; NO_WALL where none is stable;
-    DOUBTFUL where rounding hides it.
+    """Search the wall of smallest spectral radius of loop i: FOUND, with its K, B and radius in `fastest`; NO_WALL
+    where none is stable; DOUBTFUL where rounding hides it.
     """
     fastest = memory.fastest
-    fastest[0], fastest[1], fastest[2] = np.nan, np.nan, np.inf
+    fastest[FASTEST_K], fastest[FASTEST_B], fastest[FASTEST_RADIUS] = np.nan, np.nan, np.inf
     _search_double_roots(loops, i, memory)
     for _ in range(ROUNDS):
         # only walls that decay faster than the best so far, by the share FASTER of its decay, count from here on
-        radius = 1.0 - (1.0 - fastest[2]) * (1.0 + FASTER) if fastest[2] < 1.0 else 1.0
+        radius = 1.0 - (1.0 - fastest[FASTEST_RADIUS]) * (1.0 + FASTER) if fastest[FASTEST_RADIUS] < 1.0 else 1.0
         if not radius > 0.0:
             return FOUND if _keeps_digits(loops, i, memory) else DOUBTFUL
         edges = _fill_edge_walls(loops, i, radius, memory)
         if edges < 0:
             return DOUBTFUL
         if edges == 0:
-            if not fastest[2] < 1.0:
+            if not fastest[FASTEST_RADIUS] < 1.0:
                 return NO_WALL
             return FOUND if _keeps_digits(loops, i, memory) else DOUBTFUL
         if not _search_inside(memory, edges, radius):
@@ -63,15 +76,18 @@ def search_fastest(loops: LoopTable, i: int, memory: EdgeMemory) -> int:
 
 @compiled_lean
 def _keeps_digits(loops: LoopTable, i: int, memory: EdgeMemory) -> bool:
-    """Whether polynomials on two circles give the fastest wall the radius that was found."""
+    """Whether the wall in `fastest` has the radius found by its polynomials on two circles, the unit circle and
+    one near that radius: where they have lost digits they differ."""
     fastest = memory.fastest
-    for radius in (1.0, 0.5 * (1.0 + fastest[2])):
+    for radius in (1.0, 0.5 * (1.0 + fastest[FASTEST_RADIUS])):
         fill_without_singularities(loops, i, radius, memory)
         N = memory.circle.sizes[DEGREE]
         p, roots = memory.room[0, : N + 1], memory.features.roots[:N]
         spread_roots(roots)
-        value = wall_radius(memory.polynomials.coefficients, radius, fastest[0], fastest[1], p, roots)
-        if not abs(value - fastest[2]) < SPLIT:
+        value = wall_radius(
+            memory.polynomials.coefficients, radius, fastest[FASTEST_K], fastest[FASTEST_B], p, roots
+        )
+        if not abs(value - fastest[FASTEST_RADIUS]) < SPLIT:
             return False
     return True
 
@@ -86,10 +102,10 @@ def double_root_excess(loops: LoopTable, i: int, root: float, radius: float, mem
     if not (known and np.isfinite(K + B)):
         return np.inf
     polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
-    # s^2 is a factor for the double root s = 0; that at s = inf leaves the two highest coefficients at zero
+    # p without its double root: s^2 is a factor for s = 0; s = inf leaves the two highest coefficients at zero
     rest, roots, low = memory.room[0, : N - 1], memory.features.roots[: N - 2], 2 if root == 0.0 else 0
     for k in range(N - 1):
-        rest[k] = polynomials[0, k + low] + K * polynomials[1, k + low] + B * polynomials[2, k + low]
+        rest[k] = polynomials[A, k + low] + K * polynomials[S, k + low] + B * polynomials[V, k + low]
     spread_roots(roots)
     return polynomial_radius(rest, radius, roots) - radius
 
@@ -104,7 +120,7 @@ def solve_double_root(loops: LoopTable, i: int, root: float, low: float, high: f
     )
     if not at_low * at_high < 0.0 or not np.isfinite(at_low * at_high):
         return np.inf
-    last, x = 0, high
+    last, x = 0, high  # last: which end was replaced, low -1 or high 1
     for _ in range(60):
         x = (low * at_high - high * at_low) / (at_high - at_low)
         value = double_root_excess(loops, i, root, x, memory)
@@ -124,18 +140,20 @@ def solve_double_root(loops: LoopTable, i: int, root: float, low: float, high: f
 
 @compiled
 def solve_double_root_alone(loops: LoopTable, root: float, low: float, high: float, memory: EdgeMemory) -> float:
-    """`solve_double_root` of the first loop."""
+    """`solve_double_root` of the first loop of a table, for callers that are not compiled."""
     return solve_double_root(loops, 0, root, low, high, memory)
 
 
 @compiled_lean
 def _search_double_roots(loops: LoopTable, i: int, memory: EdgeMemory) -> None:
-    """The wall with a double real root as large as another that decays fastest, into `fastest` if there is one."""
+    """Of the walls with a double real root and another root as large, put the one that decays fastest into
+    `fastest`, if there is one."""
     fill_without_singularities(loops, i, 1.0, memory)
     if memory.circle.sizes[DEGREE] < 3:
         return
     ratio = (FARTHEST / NEAREST) ** (1.0 / (RADII - 1))
     for root in (0.0, np.inf):
+        # radii from the unit circle inwards; away = 1 - radius
         before, away, at_before = 1.0 - NEAREST, NEAREST, np.inf
         for _ in range(RADII):
             radius = 1.0 - away
@@ -148,11 +166,12 @@ def _search_double_roots(loops: LoopTable, i: int, memory: EdgeMemory) -> None:
 
 @compiled_lean
 def _keep_double_root(loops: LoopTable, i: int, root: float, low: float, high: float, memory: EdgeMemory) -> None:
-    """Take the wall that `solve_double_root` finds for the fastest if it decays as fast as the one found."""
+    """Put the wall that `solve_double_root` finds between two radii into `fastest` if it decays at least as fast
+    as that there."""
     radius = solve_double_root(loops, i, root, low, high, memory)
-    if radius <= memory.fastest[2] + 1e-12:
-        memory.fastest[0], memory.fastest[1] = memory.double_root[0], memory.double_root[1]
-        memory.fastest[2] = radius
+    if radius <= memory.fastest[FASTEST_RADIUS] + 1e-12:
+        memory.fastest[FASTEST_K], memory.fastest[FASTEST_B] = memory.double_root[0], memory.double_root[1]
+        memory.fastest[FASTEST_RADIUS] = radius
 
 
 @compiled_lean
@@ -162,7 +181,7 @@ def _refine_at_double_root(loops: LoopTable, i: int, memory: EdgeMemory) -> None
     if memory.circle.sizes[DEGREE] < 3:
         return
     for reach in REACHES:
-        best = memory.fastest[2]
+        best = memory.fastest[FASTEST_RADIUS]
         away = reach * (1.0 - best)
         for root in (0.0, np.inf):
             _keep_double_root(loops, i, root, max(best - away, 1e-6), min(best + away, 1.0), memory)
@@ -170,7 +189,8 @@ def _refine_at_double_root(loops: LoopTable, i: int, memory: EdgeMemory) -> None
 
 @compiled_lean
 def _fill_edge_walls(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> int:
-    """The walls of the edge on a circle, K and B in `picked[1:]`: their number; -1 where rounding hides one."""
+    """Put the walls of the edge on a circle into rows of `picked`. Returns their number; -1 if rounding hides
+    one."""
     fill_loop(loops, i, radius, memory)
     if not fill_curve(memory, SHARE, LONGEST, NEAR_END):
         return -1
@@ -180,7 +200,7 @@ def _fill_edge_walls(loops: LoopTable, i: int, radius: float, memory: EdgeMemory
         if samples.flag[k] == HIDDEN:
             return -1
         if samples.flag[k] == EDGE:
-            walls[1, n], walls[2, n] = samples.K[k], samples.B[k]
+            walls[K_ROW, n], walls[B_ROW, n] = samples.K[k], samples.B[k]
             n += 1
     return n
 
@@ -188,40 +208,44 @@ def _fill_edge_walls(loops: LoopTable, i: int, radius: float, memory: EdgeMemory
 @compiled_lean
 def _search_inside(memory: EdgeMemory, edges: int, radius: float) -> bool:
     """Search among the walls that an edge encloses, from the best middles between its walls: whether one is found
-    that decays faster than the fastest so far, and takes its place."""
+    that decays faster than the fastest so far, and takes its place.
+
+    edges   number of the edge's walls in `picked`
+    radius  of the circle of the edge and of the polynomials
+    """
     walls, fastest, search, N = memory.picked, memory.fastest, memory.search, memory.circle.sizes[DEGREE]
     polynomials = memory.polynomials.coefficients
     p, roots = memory.room[0, : N + 1], memory.features.roots[:N]
     for c in range(2):
         low, high = np.inf, -np.inf
         for k in range(edges):
-            low, high = min(low, walls[1 + c, k]), max(high, walls[1 + c, k])
+            low, high = min(low, walls[K_ROW + c, k]), max(high, walls[K_ROW + c, k])
         search.extent[c] = max(high - low, 1e-300)
     for k in range(STARTS):
-        search.starts[k, 2] = np.inf
+        search.starts[k, FASTEST_RADIUS] = np.inf
     count = min(edges, PICKS)
     for a in range(count):
         for b in range(a, count):
             i, j = a * (edges - 1) // max(count - 1, 1), b * (edges - 1) // max(count - 1, 1)
-            K, B = 0.5 * (walls[1, i] + walls[1, j]), 0.5 * (walls[2, i] + walls[2, j])
+            K, B = 0.5 * (walls[K_ROW, i] + walls[K_ROW, j]), 0.5 * (walls[B_ROW, i] + walls[B_ROW, j])
             spread_roots(roots)
             _keep_start(search.starts, K, B, wall_radius(polynomials, radius, K, B, p, roots))
     found = False
     for k in range(STARTS):
         start = search.starts[k]
-        if start[2] < np.inf:
+        if start[FASTEST_RADIUS] < np.inf:
             K, B, value = descend(
                 polynomials, radius, start, search.extent, search.sizes, search.least, p, roots, search.simplex
             )
-            if value < min(fastest[2], radius):
-                fastest[0], fastest[1], fastest[2] = K, B, value
+            if value < min(fastest[FASTEST_RADIUS], radius):
+                fastest[FASTEST_K], fastest[FASTEST_B], fastest[FASTEST_RADIUS] = K, B, value
                 found = True
     return found
 
 
 @compiled_lean
 def _keep_start(best: Floats, K: float, B: float, value: float) -> None:
-    """Keep a wall with its radius among the best starts (s, 3), the fastest first."""
+    """Keep a wall among the best starts (s, 3), K, B and radius `value` of each, the smallest radius first."""
     k = len(best)
     while k > 0 and value < best[k - 1, 2]:
         k -= 1
@@ -240,13 +264,16 @@ def wall_radius(polynomials: Floats, radius: float, K: float, B: float, p: Float
     p, roots     (N + 1,), (N,)  working memory; roots are where the search for them starts
     """
     for i in range(len(p)):
-        p[i] = polynomials[0, i] + K * polynomials[1, i] + B * polynomials[2, i]
+        p[i] = polynomials[A, i] + K * polynomials[S, i] + B * polynomials[V, i]
     return polynomial_radius(p, radius, roots)
 
 
 @compiled
 def scatter_values(polynomials: Floats, radius: float, K: Floats, B: Floats) -> Floats:
-    """Spectral radii at many walls."""
+    """Spectral radii (n,) of walls K, B (n,).
+
+    polynomials  (3 or more, N + 1)  A, S, V on the circle |z| = radius
+    """
     N = polynomials.shape[1] - 1
     p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
     out = np.empty(len(K))
@@ -260,7 +287,7 @@ def scatter_values(polynomials: Floats, radius: float, K: Floats, B: Floats) -> 
 def descend_alone(
     polynomials: Floats, radius: float, start: Floats, extent: Floats, sizes: Floats, least: Floats
 ) -> tuple[float, float, float]:
-    """`descend` with memory of its own."""
+    """`descend` with working memory of its own, for callers that are not compiled."""
     N = polynomials.shape[1] - 1
     p, roots, x = np.empty(N + 1), np.empty(N, dtype=np.complex128), np.empty((3, 3))
     return descend(polynomials, radius, start, extent, sizes, least, p, roots, x)
@@ -280,7 +307,9 @@ def descend(
 ) -> tuple[float, float, float]:
     """Nelder and Mead's simplex (1965) from `start`, restarted at each size; K, B and the radius found.
 
-    start, extent  (2,)  K and B; the extent of the cell, in shares of which sizes count
+    polynomials, radius  as for `wall_radius`
+    start, extent  (2,)  K and B; the extent of the cell in K and in B
+    sizes          (r,)  of the simplex after each restart, in shares of the extent
     least          (2,)  least K and B; a wall below stands for the nearest one that is not
     p, roots       as for `wall_radius`
     x              (3, 3)  working memory: K, B and radius of each corner
@@ -326,7 +355,7 @@ def descend(
 
 @compiled_lean
 def _sort_corners(x: Floats) -> None:
-    """Corners of a triangle by ascending value; equal ones stay in their order."""
+    """Sort the corners x (3, 3), K, B and radius of each, by ascending radius; equal ones stay in their order."""
     for i in range(1, 3):
         j = i
         while j > 0 and x[j, 2] < x[j - 1, 2]:

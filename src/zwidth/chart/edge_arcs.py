@@ -13,7 +13,18 @@ import numpy as np
 
 from zwidth.chart.arcs import CHORD, MINUS, PAIR, PLUS
 from zwidth.chart.curve import OF_LINE, zero_between
-from zwidth.chart.edge_memory import ARCS, CROSSINGS, MOST_ARCS, MOST_PIECES, PIECES, RINGS, SAMPLES, EdgeMemory
+from zwidth.chart.edge_memory import (
+    ARCS,
+    CROSSINGS,
+    EDGE_SIZE,
+    MOST_ARCS,
+    MOST_PIECES,
+    PERIOD,
+    PIECES,
+    RINGS,
+    SAMPLES,
+    EdgeMemory,
+)
 from zwidth.chart.loop_polynomials import edges_on_line
 from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of, wall_on_line
 from zwidth.chart.wall_samples import EDGE, HIDDEN
@@ -28,8 +39,8 @@ UNSURE_SIDE, ON_LINE = 1e-13, 1e-10
 
 @compiled_lean
 def fill_pair_arcs(memory: EdgeMemory) -> bool:
-    """Arcs of complex pairs, the runs of edge samples between settled corners; False where memory does not hold
-    them. The first stage that adds arcs."""
+    """Add arcs of complex pairs, the runs of edge samples between settled corners; False where memory does not
+    hold them. The first stage that adds arcs."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     memory.counts[ARCS] = 0
     low = -1
@@ -48,7 +59,7 @@ def fill_pair_arcs(memory: EdgeMemory) -> bool:
 
 @compiled_lean
 def _add_pair_arc(memory: EdgeMemory, low: int, high: int) -> bool:
-    """The arc of edge samples low to high."""
+    """Add the arc of edge samples low to high; False where memory is full."""
     samples, arcs, n = memory.samples, memory.arcs, memory.counts[SAMPLES]
     t = samples.t
     if low > 0:
@@ -92,14 +103,15 @@ def stable_on_left(memory: EdgeMemory, t: float) -> bool:
     -Im(V conj S) = -|S|^2 Im w (Neimark's rule).
     """
     cc, ss, sc = half_angle(t)
+    # w = value / size
     value, _, size, _ = velocity_on_circle(memory.circle, cc, ss, sc)
     return bool(value.imag * size > 0.0)
 
 
 @compiled_lean
 def fill_line_pieces(memory: EdgeMemory) -> int:
-    """Pieces of both lines of real roots between the places where another root meets the circle, flagged at their
-    middles: the number left HIDDEN, or -1 where memory does not hold them."""
+    """Fill in the pieces of both lines of real roots between the places where another root meets the circle,
+    flagged at their middles: the number left HIDDEN, or -1 where memory does not hold them."""
     memory.counts[PIECES], memory.counts[CROSSINGS] = 0, 0
     hidden = 0
     for root in (0.0, np.inf):
@@ -112,9 +124,10 @@ def fill_line_pieces(memory: EdgeMemory) -> int:
 
 @compiled_lean
 def _add_pieces(memory: EdgeMemory, root: float) -> int:
-    """`fill_line_pieces` for the line of one real root: 0, z = rho, or inf, z = -rho."""
+    """Add the pieces of the line of one real root, 0 (z = rho) or inf (z = -rho): the number left HIDDEN, or -1
+    where memory does not hold them."""
     _, s, v = line_of(memory, root)
-    T, pieces, nodes = memory.size[1], memory.pieces, memory.pieces.nodes
+    T, pieces, nodes = memory.size[PERIOD], memory.pieces, memory.pieces.nodes
     length = np.hypot(s / T, v)
     if not length > 0.0:
         return 0
@@ -123,6 +136,7 @@ def _add_pieces(memory: EdgeMemory, root: float) -> int:
     n = _fill_nodes(memory, root)
     if n < 0:
         return -1
+    # nodes: K, B and place along the line, put in the order of their places
     for k in range(n):
         nodes[k, 2] = along_K * nodes[k, 0] * T + along_B * nodes[k, 1]
     for k in range(1, n):
@@ -156,8 +170,11 @@ def _add_pieces(memory: EdgeMemory, root: float) -> int:
 
 @compiled_lean
 def _fill_nodes(memory: EdgeMemory, root: float) -> int:
-    """Walls on a line of real roots where the curve meets it, in no order; their number, or -1 if they are too
-    many."""
+    """Put walls on a line of real roots where the curve, or the other line, meets it into `pieces.nodes`, K and B
+    of each, in no order. Returns their number, or -1 if they are too many.
+
+    root  0 for the line of z = rho, inf for that of z = -rho
+    """
     line, samples, nodes = line_of(memory, root), memory.samples, memory.pieces.nodes
     a, s, v = line
     n = 0
@@ -194,7 +211,7 @@ def _fill_nodes(memory: EdgeMemory, root: float) -> int:
 
 @compiled_lean
 def add_line_arcs(memory: EdgeMemory) -> bool:
-    """The pieces of lines that are edges, as arcs; False where memory does not hold them."""
+    """Add the pieces of lines that are edges as arcs; False where memory does not hold them."""
     pieces, arcs = memory.pieces, memory.arcs
     for p in range(memory.counts[PIECES]):
         if pieces.flag[p] != EDGE:
@@ -213,19 +230,19 @@ def add_line_arcs(memory: EdgeMemory) -> bool:
 
 @compiled_apart
 def join_arcs(memory: EdgeMemory, blur: float) -> bool:
-    """Walks along arcs as `order` and `next_arc`, or False if one of them does not close.
+    """Walk along the arcs, which fills in `order` and `next_arc`; False if one of the walks does not close.
 
     blur  corners within this share of the set's size are one; an arc that is no longer is no more than a corner
     """
     arcs, counts, n = memory.arcs, memory.counts, memory.counts[ARCS]
     _fill_sizes(memory)
     counts[RINGS] = 0
-    reach = blur * memory.size[0]
+    reach = blur * memory.size[EDGE_SIZE]
     _number_corners(memory, reach)
-    left = 0
+    to_walk = 0
     for k in range(n):
-        arcs.next_arc[k] = -2 if arcs.extent[k] > reach else -1  # -2: not yet walked
-        left += arcs.extent[k] > reach
+        arcs.next_arc[k] = -2 if arcs.extent[k] > reach else -1  # -2: not yet walked; -1: never
+        to_walk += arcs.extent[k] > reach
     done = 0
     for begin in range(n):
         if arcs.next_arc[begin] != -2:
@@ -243,13 +260,13 @@ def join_arcs(memory: EdgeMemory, blur: float) -> bool:
                 break
             k = following
         counts[RINGS] += 1
-    return done == left
+    return done == to_walk
 
 
 @compiled_lean
 def _fill_sizes(memory: EdgeMemory) -> None:
     """Put the extent of each arc, and the size of the whole edge, into memory."""
-    arcs, samples, T = memory.arcs, memory.samples, memory.size[1]
+    arcs, samples, T = memory.arcs, memory.samples, memory.size[PERIOD]
     largest = 0.0
     for k in range(memory.counts[ARCS]):
         K0, B0, extent = arcs.first[k, 0], arcs.first[k, 1], 0.0
@@ -260,13 +277,13 @@ def _fill_sizes(memory: EdgeMemory) -> None:
             extent = max(extent, abs(samples.K[i] - K0) * T, abs(samples.B[i] - B0))
         # a chord that bridges a gap counts however short it is
         arcs.extent[k] = np.inf if arcs.kind[k] == CHORD else extent
-    memory.size[0] = largest
+    memory.size[EDGE_SIZE] = largest
 
 
 @compiled_lean
 def _number_corners(memory: EdgeMemory, reach: float) -> None:
     """Give each end of an arc a number in memory, the same to ends within reach of each other: one corner."""
-    arcs, T, n = memory.arcs, memory.size[1], memory.counts[ARCS]
+    arcs, T, n = memory.arcs, memory.size[PERIOD], memory.counts[ARCS]
     for k in range(2 * n):
         arcs.node[k // 2, k % 2] = -1
     for k in range(2 * n):
@@ -294,7 +311,7 @@ def _next_arc(memory: EdgeMemory, k: int, begin: int) -> int:
 
     begin  the arc with which the walk began, which may end it
     """
-    arcs, T = memory.arcs, memory.size[1]
+    arcs, T = memory.arcs, memory.size[PERIOD]
     # directions are compared with K T against B, which have one unit
     back = np.arctan2(arcs.first[k, 1] - arcs.last[k, 1], (arcs.first[k, 0] - arcs.last[k, 0]) * T)
     best, least = -1, np.inf

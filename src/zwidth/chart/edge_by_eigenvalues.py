@@ -21,6 +21,7 @@ from zwidth.chart.edge_arcs import SAME_CORNER, add_line_arcs, fill_line_pieces,
 from zwidth.chart.edge_memory import (
     ARCS,
     CROSSINGS,
+    EDGE_SIZE,
     MOST_ARCS,
     NONE,
     PIECES,
@@ -137,10 +138,16 @@ def arcs_of_rings(rings: EdgeRings) -> Arcs:
 def _stage(
     loops: LoopTable, memory: EdgeMemory, stage: int, value: float, longest: float, near_end: float
 ) -> float:
-    """Run one stage; value is the radius for SAMPLE (with the share in `size[0]`), the blur for JOIN."""
+    """Run one stage for the first loop of a table.
+
+    value              radius for SAMPLE, with the share of `fill_curve` in `size[EDGE_SIZE]`; blur for JOIN
+    longest, near_end  as for `fill_curve`
+    Returns            1, or 0 where memory does not hold what is found; for JOIN 0 where a ring does not close;
+                       for LINE_PIECES what `fill_line_pieces` returns
+    """
     if stage == SAMPLE:
         memory.circle.sizes[COMPUTER] = -1
-        share = memory.size[0]
+        share = memory.size[EDGE_SIZE]
         fill_loop(loops, 0, value, memory)
         return 1.0 if fill_curve(memory, share, longest, near_end) else 0.0
     if stage == WALLS:
@@ -161,7 +168,8 @@ def _stage(
 
 
 def _run(tracer: Tracer, memory: EdgeMemory, stage: int, value: float = 0.0) -> float:
-    """`_stage` for a tracer's loop. Raises ChartError where memory does not hold what the stage finds."""
+    """What `_stage` returns for a tracer's loop. Raises ChartError where memory does not hold what the stage
+    finds."""
     result = _stage(tracer.table, memory, stage, value, LONGEST, NEAR_END)
     if stage != JOIN and (result == 0.0 if stage != LINE_PIECES else result < 0.0):
         raise ChartError(
@@ -177,9 +185,10 @@ def join(tracer: Tracer, memory: EdgeMemory, blur: float) -> bool:
 
 
 def find_arcs(tracer: Tracer, memory: EdgeMemory, share: float, added: Floats) -> None:
-    """Every arc of the stable set's edge that samples in steps of `share`, and those at t `added`, reveal."""
+    """Fill in every arc of the stable set's edge that samples in steps of `share`, and those at t in `added`,
+    reveal."""
     samples, counts = memory.samples, memory.counts
-    memory.size[0] = share
+    memory.size[EDGE_SIZE] = share  # read there by the first stage; the edge's size is not known yet
     _run(tracer, memory, SAMPLE, tracer.radius)
     if len(added):
         t = np.union1d(samples.t[: counts[SAMPLES]], added)[: len(samples.t) - 1]
@@ -197,7 +206,7 @@ def find_arcs(tracer: Tracer, memory: EdgeMemory, share: float, added: Floats) -
         _run(tracer, memory, CORNERS)
     for i in np.flatnonzero((flags[1:] == EDGE) != (flags[:-1] == EDGE)).tolist():
         if samples.corner[i] != SETTLED:
-            on, off = (i, i + 1) if flags[i] == EDGE else (i + 1, i)
+            on, off = (i, i + 1) if flags[i] == EDGE else (i + 1, i)  # the edge sample, and the other
             corner_t, partner, (wall_K, wall_B) = refine_corner(tracer, samples.t[on], samples.t[off])
             samples.corner[i], samples.corner_t[i], samples.corner_partner[i] = SETTLED, corner_t, partner
             samples.corner_K[i], samples.corner_B[i] = wall_K, wall_B
@@ -222,7 +231,7 @@ def decide_flags(tracer: Tracer, thetas: Floats, K: Floats, B: Floats, flags: ND
         return
     if not tracer.is_high_degree:
         flags[unsure] = tracer.edge_by_eigenvalues(thetas[unsure], K[unsure], B[unsure])
-    sure = np.flatnonzero(flags)
+    sure = np.flatnonzero(flags)  # not HIDDEN, which is 0
     if len(sure):
         flags[:] = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
 
@@ -238,18 +247,19 @@ def decided_trace(tracer: Tracer, thetas: Floats, t: Floats | None = None) -> tu
 
 
 def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, float, Wall]:
-    """The t of the corner between an edge sample and one that is none, that of its partner, and its wall.
+    """The t of the corner between an edge sample (t = on) and one that is none (t = off), that of its partner, the
+    other root on the circle, and its wall.
 
     The partner is 0 or inf where a real root reaches the circle. Where two branches touch without crossing the
     place found by halving stands.
     """
-    edge, none = on, off
+    edge, beyond = on, off
     for _ in range(HALVINGS):
-        middle = 0.5 * (edge + none)
+        middle = 0.5 * (edge + beyond)
         if tracer.edge_flag(2.0 * np.arctan(middle)) > 0:
             edge = middle
         else:
-            none = middle
+            beyond = middle
     for root, partner in zip(ROOTS, (0.0, np.inf), strict=True):
         line = tuple(tracer.line(root).tolist())
         crossing, wall = _line_crossing(tracer.circle, line, min(on, off), max(on, off))
@@ -262,7 +272,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, float, 
         return edge, 0.0, wall
     partner = float(np.tan(0.5 * abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))))
     if 0.0 < partner < 1e15:
-        one, other, better, settled = _crossing(tracer.circle, edge, partner)
+        one, other, better, settled = _self_crossing(tracer.circle, edge, partner)
         if settled and abs(one - edge) <= SAME_PLACE * edge:
             return one, other, tracer.wall(2.0 * np.arctan(better))[:2]
     return edge, partner, wall
@@ -284,8 +294,9 @@ def _line_crossing(
 
 
 @compiled
-def _crossing(circle: CircleFactors, one: float, other: float) -> tuple[float, float, float, bool]:
-    """What `solve_crossing` gives, with the better conditioned of its two t before the flag."""
+def _self_crossing(circle: CircleFactors, one: float, other: float) -> tuple[float, float, float, bool]:
+    """The two t, near one and other, at which the curve crosses itself; the better conditioned of them; and
+    whether they settled (`solve_crossing`)."""
     a, b, settled = solve_crossing(circle, one, other)
     return a, b, better_conditioned(circle, a, b), settled
 
@@ -299,7 +310,7 @@ def _is_stable_inside(tracer: Tracer, arcs: Arcs) -> bool:
     """
     inside = []
     for ring in arcs.rings:
-        walks = [_walls(tracer, arcs[k]) * (tracer.period, 1.0) for k in ring]
+        walks = [_walls_along_arc(tracer, arcs[k]) * (tracer.period, 1.0) for k in ring]
         deepest = 1e-3 * float(np.min(np.ptp(np.vstack(walks), axis=0)))
         for points in walks:
             middle, length = len(points) // 2, float(np.max(np.ptp(points, axis=0)))
@@ -313,14 +324,15 @@ def _is_stable_inside(tracer: Tracer, arcs: Arcs) -> bool:
     return bool(np.all(np.abs(z) < tracer.radius + CIRCLE_TOLERANCE))
 
 
-def _walls(tracer: Tracer, arc: Arc) -> Floats:
+def _walls_along_arc(tracer: Tracer, arc: Arc) -> Floats:
     """Walls (k, 2) [K, B] along an arc: its first, those of the samples that found it, its last."""
     K, B = tracer.walls(arc.thetas)
     return np.vstack([arc.first, np.column_stack([K, B]), arc.last])
 
 
 def _samples_around_corners(memory: EdgeMemory) -> Floats:
-    """The t close to each known corner or crossing, on both sides, and halfway between neighbours."""
+    """Places t (k,) close to each known corner, and crossing of a line, on both sides, and halfway between
+    neighbours."""
     samples, arcs, n = memory.samples, memory.arcs, int(memory.counts[SAMPLES])
     curved = np.flatnonzero(arcs.kind[: memory.counts[ARCS]] == PAIR)
     settled = np.flatnonzero(samples.corner[: n - 1] != NONE)
@@ -342,7 +354,8 @@ def bridge_gaps(tracer: Tracer, memory: EdgeMemory) -> float | None:
     rounding of a single angle: its samples stop short of its corners. What is missing is a chord between two open
     ends, along which a root stays on the circle as far as double precision can tell.
     """
-    arcs, counts, size = memory.arcs, memory.counts, float(memory.size[0])
+    arcs, counts, size = memory.arcs, memory.counts, float(memory.size[EDGE_SIZE])
+    # corner, wall and t of each arc's end, and of each arc's beginning; those that meet are taken out
     alive = np.flatnonzero(arcs.extent[: counts[ARCS]] > SAME_CORNER * size)
     ends = [(int(arcs.node[k, 1]), arcs.last[k].copy(), arcs.end[k]) for k in alive]
     starts = [(int(arcs.node[k, 0]), arcs.first[k].copy(), arcs.start[k]) for k in alive]

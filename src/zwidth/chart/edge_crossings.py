@@ -133,8 +133,13 @@ class EdgeChords:
         self, curve: EdgeCurve, chord: NDArray[np.intp], at: Floats, across: int
     ) -> tuple[Floats, Floats]:
         """Move crossings from the chords to the curve, by false position in the angle, the retained end's value
-        halved (Illinois)."""
-        turn = 2.0 * np.pi * curve.loop.period
+        halved (Illinois).
+
+        chord, at  (c,)  number of each crossing's chord, and K or B of the line that it crosses
+        across     component that is constant on the line: 0 for K, 1 for B
+        Returns    (c,) the other component on the curve, and the frequency there [Hz]
+        """
+        turn = 2.0 * np.pi * curve.loop.period  # angle per hertz
         a, b = self.frequency[chord, 0] * turn, self.frequency[chord, 1] * turn
         at_a, at_b = self.first[chord, across] - at, self.last[chord, across] - at
         other = self.first[chord, 1 - across]

@@ -35,6 +35,12 @@ FOUND, NO_WALL, DOUBTFUL = range(3)
 NONE, SETTLED, OPEN = range(3)
 # Places in `EdgeMemory.counts`.
 SAMPLES, ARCS, PIECES, RINGS, STOPS, CROSSINGS = range(6)
+# Places in `EdgeMemory.size`, in `EdgeMemory.peak` and in `EdgeMemory.fastest`.
+EDGE_SIZE, PERIOD = range(2)
+PEAK_K, PEAK_B, PEAK_T, PEAK_PARTNER = range(4)
+FASTEST_K, FASTEST_B, FASTEST_RADIUS = range(3)
+# Rows of `EdgeMemory.picked` where it holds walls of the curve.
+T_ROW, K_ROW, B_ROW = range(3)
 # Places in `EdgeMemory.numbers`.
 LARGEST_DAMPING, AREA = range(2)
 
@@ -125,6 +131,8 @@ class DecaySearch(NamedTuple):
 class EdgeMemory(NamedTuple):
     """Working memory for one loop after the other.
 
+    circle, polynomials, features  of the loop on the circle
+    lanes   working memory of `wall_samples`;   room  of `loop_polynomials`
     counts  (6,)  samples, arcs, pieces, rings, stops and crossings of lines in use
     size    (2,)  largest |K T|, |B| of the whole edge, and T
     picked  (4, n), (n,), (n,)  working memory: of samples that are flagged t, K and B, number, flag; of pieces of

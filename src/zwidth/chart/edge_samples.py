@@ -13,7 +13,7 @@ from zwidth.chart.circle_sampling import (
     fill_samples,
 )
 from zwidth.chart.curve_refinement import refine_samples
-from zwidth.chart.edge_memory import CROSSINGS, NONE, SAMPLES, SETTLED, EdgeMemory
+from zwidth.chart.edge_memory import B_ROW, CROSSINGS, K_ROW, NONE, PERIOD, SAMPLES, SETTLED, T_ROW, EdgeMemory
 from zwidth.chart.loop_polynomials import (
     edges_stable_set,
     fill_computer_polynomials,
@@ -44,8 +44,8 @@ CLOSEST: Final = 1e-9  # share of t within which two places on the curve are one
 
 @compiled_lean
 def fill_loop(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
-    """The factors, polynomials and singular points of loop i on |z| = radius. What its computer alone decides is
-    kept from the loop before, if that has the same one."""
+    """Fill in the factors, polynomials and singular points of loop i on |z| = radius. What its computer alone
+    decides is kept from the loop before, if that has the same one."""
     circle, computer = memory.circle, loops.computer[i]
     if circle.sizes[COMPUTER] != computer or circle.radius[0] != radius:
         fill_computer(loops, computer, radius, circle)
@@ -54,14 +54,14 @@ def fill_loop(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> No
     fill_plant(loops, i, circle)
     fill_polynomials(circle, memory.polynomials)
     fill_features(circle, memory.polynomials, memory.features)
-    memory.size[1] = loops.period[computer]
+    memory.size[PERIOD] = loops.period[computer]
 
 
 @compiled_lean
 def fill_without_singularities(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
-    """The factors and polynomials of loop i on |z| = radius, without its singular points."""
+    """Fill in the factors and polynomials of loop i on |z| = radius, without its singular points."""
     fill_loop_polynomials(loops, i, radius, memory.circle, memory.polynomials)
-    memory.circle.sizes[COMPUTER] = -1  # its singular points do not stand
+    memory.circle.sizes[COMPUTER] = -1  # so that the next loop fills in its singular points
 
 
 @compiled_apart
@@ -72,6 +72,7 @@ def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float
     """
     circle = memory.circle
     sizes, t = circle.sizes, memory.samples.t
+    # past samples that the loop uses: a delay of n samples turns n times as fast as z
     late = sizes[WHOLE_DELAY] + sizes[WINDOW]
     n = fill_samples(memory.features, circle.radius[0], share, min(longest, 0.5 / late), near_end, t)
     # a plain backward difference is nowhere blind
@@ -91,6 +92,7 @@ def add_samples_between_corners(memory: EdgeMemory) -> bool:
 
     An arc may lie between two samples. Its ends are then known nevertheless, from the other arcs that end there.
     """
+    # places: t of corners and crossings, new: t of the samples to be added, both in free memory
     samples, places, new, n = memory.samples, memory.picked[0], memory.picked[1], memory.counts[SAMPLES]
     m, most = 0, len(places)
     for i in range(n - 1):
@@ -134,7 +136,7 @@ def add_samples_between_corners(memory: EdgeMemory) -> bool:
 
 @compiled_lean
 def add_sample(memory: EdgeMemory, t: float) -> bool:
-    """Add one sample; False where memory is full."""
+    """Add the sample at t = tan(theta/2) in its order; False where memory is full."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     if n + 1 >= len(samples.t):
         return False
@@ -154,13 +156,13 @@ def walls_again(memory: EdgeMemory) -> None:
     samples, beside, n = memory.samples, memory.picked, memory.counts[SAMPLES]
     walls_of_samples(memory.circle, samples.t, n, samples.K, samples.B, memory.lanes)
     for i in range(n):
-        beside[0, i] = samples.t[i] * (1.0 + BESIDE)
-    walls_of_samples(memory.circle, beside[0], n, beside[1], beside[2], memory.lanes)
+        beside[T_ROW, i] = samples.t[i] * (1.0 + BESIDE)
+    walls_of_samples(memory.circle, beside[T_ROW], n, beside[K_ROW], beside[B_ROW], memory.lanes)
     # slopes per ln t, by differences with walls beside: refining needs no more digits
     for i in range(n):
-        samples.slope_K[i] = (beside[1, i] - samples.K[i]) * (1.0 / BESIDE)
+        samples.slope_K[i] = (beside[K_ROW, i] - samples.K[i]) * (1.0 / BESIDE)
     for i in range(n):
-        samples.slope_B[i] = (beside[2, i] - samples.B[i]) * (1.0 / BESIDE)
+        samples.slope_B[i] = (beside[B_ROW, i] - samples.B[i]) * (1.0 / BESIDE)
     for i in range(n):
         samples.flag[i], samples.corner[i] = UNKNOWN, NONE
 
@@ -184,23 +186,23 @@ def flag_all(memory: EdgeMemory) -> None:
 
 @compiled_lean
 def flag_quadrant(memory: EdgeMemory) -> None:
-    """Flags of samples with K > 0 and B >= 0 and of their neighbours; UNKNOWN for all others."""
+    """Flag the samples with K > 0 and B >= 0, and their neighbours; all others stay UNKNOWN."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     K, B, picked, number = samples.K, samples.B, memory.picked, memory.picked_number
     m, before, here = 0, False, K[0] > 0.0 and B[0] >= 0.0
     for i in range(n):
         after = i < n - 1 and K[i + 1] > 0.0 and B[i + 1] >= 0.0
         if before or here or after:
-            number[m], picked[0, m], picked[1, m], picked[2, m] = i, samples.t[i], K[i], B[i]
+            number[m], picked[T_ROW, m], picked[K_ROW, m], picked[B_ROW, m] = i, samples.t[i], K[i], B[i]
             m += 1
         before, here = here, after
     flag_walls(
         memory.polynomials.coefficients,
         memory.circle.sizes[DEGREE],
         m,
-        picked[0],
-        picked[1],
-        picked[2],
+        picked[T_ROW],
+        picked[K_ROW],
+        picked[B_ROW],
         memory.picked_flag,
         memory.lanes,
         memory.room,
@@ -221,6 +223,7 @@ def degree_of(loops: LoopTable, i: int) -> int:
     """Degree of a loop's characteristic polynomial."""
     c = loops.computer[i]
     N = 2 * loops.section_count[i] + loops.whole_delay[c] + loops.split[c] + loops.window_count[c] - 1
+    # a factor of the computer whose denominator has d2 = 0 is of first order
     for k in range(loops.force_count[c]):
         N += 2 if loops.force[c, k, 3] != 0.0 else 1
     for k in range(loops.velocity_count[c]):

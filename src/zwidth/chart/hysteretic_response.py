@@ -117,12 +117,13 @@ class ModalPlant:
         """The modal form of a plant, with hysteresis or without."""
         squared, V = undamped_modes(plant.mass, plant.stiffness)
         loss = np.zeros_like(plant.mass) if plant.hysteresis is None else V.T @ plant.hysteresis @ V
-        loss[np.abs(loss) <= RIGID * np.max(np.abs(loss))] = 0.0
+        loss[np.abs(loss) <= RIGID * np.max(np.abs(loss))] = 0.0  # what rounding leaves of lossless modes
         dampers = [np.sqrt(damper.damping) * (damper.along @ V) for damper in plant.lagged_dampers]
         lags = np.array([damper.time_constant for damper in plant.lagged_dampers])
         damping = V.T @ plant.damping @ V
-        into, out = plant.actuator @ V, plant.sensor @ V
-        return cls(squared, loss, damping, np.array(dampers).reshape(-1, len(V)), lags, into, out)
+        modal_actuator, modal_sensor = plant.actuator @ V, plant.sensor @ V
+        directions = np.array(dampers).reshape(-1, len(V))
+        return cls(squared, loss, damping, directions, lags, modal_actuator, modal_sensor)
 
     def response(self, w: Floats) -> Complexes:
         """G(iw) (...) from force to reading at angular frequencies w (...) [1/s], of either sign [m/N]."""
@@ -140,6 +141,7 @@ class ModalPlant:
 
     def natural_rates(self) -> Floats:
         """|Im s| [1/s] of the poles, at which the response to steady vibration turns sharply."""
+        # states: the modes' amplitudes, their rates, and the lagged velocities of the dampers
         n, k = len(self.squared), len(self.lags)
         A = np.zeros((2 * n + k, 2 * n + k), dtype=complex)
         A[:n, n : 2 * n] = np.eye(n)
@@ -172,41 +174,46 @@ class SampledResponse:
     def of(cls, loop: Loop) -> SampledResponse:
         """The sampled response of a loop, its far aliases summed beforehand."""
         reference = replace(loop, plant=viscous_equivalent(loop.plant))
-        lossy, damped = ModalPlant.of(loop.plant), ModalPlant.of(reference.plant)
-        rates = np.concatenate([lossy.natural_rates(), damped.natural_rates(), [0.0]])
-        folds = rates * loop.period / (2.0 * np.pi)
+        hysteretic, viscous = ModalPlant.of(loop.plant), ModalPlant.of(reference.plant)
+        rates = np.concatenate([hysteretic.natural_rates(), viscous.natural_rates(), [0.0]])
+        folds = rates * loop.period / (2.0 * np.pi)  # natural frequencies in sampling rates
         most = FEWEST + int(PER_FOLD * np.max(folds))
         k = np.arange(-most, most + 1)
-        sharp = np.any(np.abs(np.abs(k + 0.25)[:, None] - folds) < SMOOTH, axis=1)
+        # alias k has the frequencies from k to k + 1/2 sampling rates, as theta goes from 0 to pi
+        near = np.any(np.abs(np.abs(k + 0.25)[:, None] - folds) < SMOOTH, axis=1)
+        others = k[~near]
         far = Chebyshev.interpolate(
-            lambda theta: _response_difference(loop, lossy, damped, theta, k[~sharp]), DEGREE, domain=[0.0, np.pi]
+            lambda theta: _difference(loop, hysteretic, viscous, theta, others), DEGREE, domain=[0.0, np.pi]
         )
-        return cls(loop, lossy, damped, reference, k[sharp], far)
+        return cls(loop, hysteretic, viscous, reference, k[near], far)
 
     def __call__(self, thetas: Floats) -> Complexes:
         """Sampled response P (n,) [m/N], force to reading with hold and delay, at angles (n,) in (0, pi]."""
         parts = np.array_split(thetas, 1 + len(thetas) // CHUNK)
-        near = [_response_difference(self.loop, self.hysteretic, self.viscous, part, self.near) for part in parts]
+        near = [_difference(self.loop, self.hysteretic, self.viscous, part, self.near) for part in parts]
         low_pass, z = force_filter(self.loop.controller), np.exp(1j * thetas)
+        # the force filter and the whole samples of delay, which the differences leave out
         passed = factor_response(low_pass.numerator, low_pass.denominator, z - 1.0) / z**self.loop.whole_delay
+        # the reference loop's response is P = AP / A
         A, AP, _ = terms_along(circle_factors(table_of_loops(self.reference)), thetas).T
         return np.asarray(AP / A + passed * (np.concatenate(near) + self.far(thetas)))
 
     def rounding(self, thetas: Floats) -> Floats:
         """Rounding error of P (n,) to be expected [m/N]: a sum of modes smaller than each of them loses digits."""
-        w = thetas / self.loop.period
+        w = thetas / self.loop.period  # alias 0, the largest; its hold has the size |1 - 1/z| / theta
         sizes = np.abs(self.hysteretic.modes(w)) @ np.abs(self.hysteretic.modal_sensor)
         return np.asarray(UNIT * sizes * np.abs(np.expm1(-1j * thetas)) / thetas)
 
 
-def _response_difference(loop: Loop, lossy: ModalPlant, damped: ModalPlant, thetas: Floats, k: Ints) -> Complexes:
-    """Response of the hysteretic plant less the viscous one's (n,) [m/N], over aliases k, without whole delay."""
+def _difference(loop: Loop, hysteretic: ModalPlant, viscous: ModalPlant, thetas: Floats, k: Ints) -> Complexes:
+    """Sampled response of the hysteretic plant less the viscous one's (n,) [m/N], summed over the aliases numbered
+    k; with hold, actuator lag and the fraction of a sample of delay, without force filter and whole samples."""
     w = (thetas[:, None] + 2.0 * np.pi * k) / loop.period
     s = 1j * w
     lag = loop.controller.actuator_time_constant * s + 1.0
     late = np.exp(-s * loop.fractional_delay * loop.period)
     hold = late * -np.expm1(-1j * thetas)[:, None] / (s * lag)
-    return np.asarray(np.sum((lossy.response(w) - damped.response(w)) * hold, axis=1) / loop.period)
+    return np.asarray(np.sum((hysteretic.response(w) - viscous.response(w)) * hold, axis=1) / loop.period)
 
 
 STEP = 0.1  # first angles, in shares of the distance to the nearest singularity of the viscous plant
@@ -264,7 +271,7 @@ def _response(loop: Loop) -> Response:
     response = Response(
         frequency=thetas / (2.0 * np.pi * loop.period),
         value=sampled(thetas),
-        integrators=2 if np.any(squared == 0.0) and not braked else None,
+        integrators=2 if np.any(squared == 0.0) and not braked else None,  # of a free rigid motion
         note="computed from the loss factor",
     )
     thetas, P = _refine_angles(sampled, thetas, response.value, integrators_of(response, loop.period))
@@ -275,6 +282,7 @@ def _refine_angles(
     sampled: SampledResponse, thetas: Floats, P: Complexes, integrators: int
 ) -> tuple[Floats, Complexes]:
     """The angles and P (n,) there, refined until P is interpolated to INTERPOLATION_ERROR in every middle."""
+    # steps between two angles whose middle is not yet known to be interpolated well
     unsure = np.ones(len(thetas) - 1, dtype=bool)
     while unsure.any() and len(thetas) < MOST_SAMPLES:
         middle = 0.5 * (thetas[:-1] + thetas[1:])[unsure]
@@ -309,7 +317,7 @@ class HystereticCurve:
     def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
         """K and B (k,) at angles (k,) in (0, pi): B = Im h / Im w, K = Re h - B Re w with h = -1/P."""
         h = -1.0 / self.sampled(thetas)
-        w = self.loop.velocity_response(np.exp(1j * thetas))
+        w = self.loop.velocity_response(np.exp(1j * thetas))  # of the velocity estimate
         B = h.imag / w.imag
         return np.asarray(h.real - B * w.real), np.asarray(B)
 
@@ -342,6 +350,7 @@ def _edge_of_chart(loop: Loop) -> EdgeChords:
     from scipy.spatial import cKDTree
 
     chart = hysteretic_chart(loop)
+    # a side's ends get the frequencies of the nearest walls of the chart's edge
     sides = Arcs.chords(chart.regions)
     if not len(sides):
         return EdgeChords(np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2)))
@@ -355,16 +364,16 @@ def _edge_of_chart(loop: Loop) -> EdgeChords:
 
 
 def _edge_of_arcs(curve: HystereticCurve, viscous: TracedEdge, moved: MovedArcs) -> EdgeChords | None:
-    """Chords along the arcs between their moved ends; None where a ring of them crosses itself."""
+    """Chords along the arcs between their moved ends on the curve; None where a ring of them crosses itself."""
     arcs = viscous.arcs
     inner = [
         _angles_between(points, moved.start[k], moved.end[k]) if arcs.kind[k] == PAIR else np.empty(0)
         for k, points in enumerate(viscous.arc_points)
     ]
     for _ in range(TURN_ROUNDS):
-        walks = _walks(curve, inner, moved)
+        walks = _arc_walls(curve, inner, moved)
         inner = [_with_turns(*walk) if len(walk[0]) > 2 else walk[0][1:-1] for walk in walks]
-    walks = _walks(curve, inner, moved)
+    walks = _arc_walls(curve, inner, moved)
     for ring in arcs.rings:
         outline = np.vstack([walks[k][1][:-1] for k in ring])
         if len(outline) > 3 and not shapely.Polygon(outline).is_valid:
@@ -395,7 +404,7 @@ def _angles_between(points: ArcPoints, start: float, end: float) -> Floats:
     return angles if end > start else angles[::-1]
 
 
-def _walks(curve: HystereticCurve, inner: list[Floats], moved: MovedArcs) -> list[tuple[Floats, Floats]]:
+def _arc_walls(curve: HystereticCurve, inner: list[Floats], moved: MovedArcs) -> list[tuple[Floats, Floats]]:
     """Angles (k,) and walls (k, 2) [N/m, N s/m] along each arc: at its inner angles, and at its moved ends."""
     K, B = curve.walls(np.concatenate(inner)) if sum(map(len, inner)) else (np.empty(0), np.empty(0))
     parts = np.split(np.column_stack([K, B]), np.cumsum([len(thetas) for thetas in inner])[:-1])
@@ -409,7 +418,8 @@ def _walks(curve: HystereticCurve, inner: list[Floats], moved: MovedArcs) -> lis
 
 
 def _with_turns(thetas: Floats, walls: Floats) -> Floats:
-    """The inner angles of an arc, with those at which K or B turns by the parabola through three neighbours."""
+    """The angles of an arc, given to its ends with its walls (k, 2), without the ends and with those at which K or
+    B turns by the parabola through three neighbours."""
     turns = []
     for values in walls.T:
         step = np.diff(values)
@@ -454,7 +464,7 @@ def moved_arcs(
 ) -> MovedArcs | None:
     """Arcs of pairs of roots and of real roots with their corners on a curve near the one they were traced on.
 
-    lines    h and w of the lines of real roots, by `arcs.PLUS` and `arcs.MINUS`
+    lines    h and w of the lines of real roots K + B w = h, by `arcs.PLUS` and `arcs.MINUS`
     size     (2,) of the edge [N/m, N s/m]
     Returns  None where a corner is not found near the former one, or an arc would run backwards: the edges differ
              in their arcs then
@@ -463,25 +473,28 @@ def moved_arcs(
         return None
     following = arcs.next_arc
     start, end, corner = arcs.start.copy(), arcs.end.copy(), arcs.last.copy()
+    # at the corner behind each arc: are the arcs before and after it of the curve; do they meet it inside (0, pi)
     before, after = arcs.kind == PAIR, arcs.kind[following] == PAIR
-    between = _inner(end), _inner(arcs.start[following])
+    inside = _are_inside(end), _are_inside(arcs.start[following])
     smooth = before & after & (np.abs(end - arcs.start[following]) < SAME_ANGLE)
 
-    both = np.flatnonzero(before & after & between[0] & between[1] & ~smooth)
+    # the curve crosses itself
+    both = np.flatnonzero(before & after & inside[0] & inside[1] & ~smooth)
     a, b, found = _self_crossings(curve, end[both], arcs.start[following[both]], size)
     end[both], start[following[both]] = a, b
     corner[both] = np.column_stack(curve.walls(a)) if len(both) else corner[both]
 
-    for ahead, ends, other in ((True, end, arcs.kind[following]), (False, start, arcs.kind)):
-        own = before if ahead else after
-        place = np.arange(len(arcs)) if ahead else following
+    # the curve meets a line: the arc before the corner is of the curve and that after it a line, or the other way
+    for ahead, ends, kind_of_other in ((True, end, arcs.kind[following]), (False, start, arcs.kind)):
+        of_curve = before if ahead else after
+        arc_of_curve = np.arange(len(arcs)) if ahead else following
         for kind, (h, w) in lines.items():
-            some = np.flatnonzero(own & between[0 if ahead else 1] & (other == kind))
-            angle, met = _line_crossings(curve, ends[place[some]], h, w, size)
-            ends[place[some]], found = angle, found & met
+            some = np.flatnonzero(of_curve & inside[0 if ahead else 1] & (kind_of_other == kind))
+            angle, met = _line_crossings(curve, ends[arc_of_curve[some]], h, w, size)
+            ends[arc_of_curve[some]], found = angle, found & met
             corner[some] = np.column_stack(curve.walls(angle)) if len(some) else corner[some]
 
-    on = np.flatnonzero(smooth & between[0])
+    on = np.flatnonzero(smooth & inside[0])
     corner[on] = np.column_stack(curve.walls(end[on])) if len(on) else corner[on]
     # at z = 1 the curve ends where it did, as steady forces are the same; at z = -1 it ends on the moved line
     last = np.flatnonzero((before & (end > np.pi - NEAREST)) | (after & (arcs.start[following] > np.pi - NEAREST)))
@@ -519,7 +532,7 @@ def _differ_from(arcs: Arcs, start: Floats, end: Floats, corner: Floats, size: F
     return far or not np.all(ahead[arcs.kind == PAIR])
 
 
-def _inner(angles: Floats) -> Flags:
+def _are_inside(angles: Floats) -> Flags:
     """Which angles lie within (0, pi), farther than NEAREST from its ends."""
     return (angles > NEAREST) & (angles < np.pi - NEAREST)
 
@@ -529,8 +542,8 @@ def _room(angles: Floats) -> Floats:
     return np.minimum(angles, np.pi - angles)
 
 
-def _slopes(curve: EdgeCurve, angles: Floats) -> tuple[Floats, Floats]:
-    """Walls (k, 2) at angles (k,), and their derivatives by the angle (k, 2), by central differences."""
+def _walls_with_slopes(curve: EdgeCurve, angles: Floats) -> tuple[Floats, Floats]:
+    """Walls K, B (k, 2) at angles (k,), and their derivatives by the angle (k, 2), by central differences."""
     step = SLOPE_STEP * _room(angles)
     K, B = curve.walls(np.concatenate([angles, angles + step, angles - step]))
     walls = np.column_stack([K, B]).reshape(3, -1, 2)
@@ -546,15 +559,16 @@ def _self_crossings(curve: EdgeCurve, a: Floats, b: Floats, size: Floats) -> tup
     if not k:
         return a, b, True
     for _ in range(MOST_STEPS):
-        walls, slopes = _slopes(curve, np.concatenate([a, b]))
+        walls, slopes = _walls_with_slopes(curve, np.concatenate([a, b]))
         gap = (walls[:k] - walls[k:]) / size
         if np.max(np.abs(gap)) < SAME_WALL:
             return a, b, True
-        (da, ea), (db, eb) = (slopes[:k] / size).T, (slopes[k:] / size).T
+        (dK_a, dB_a), (dK_b, dB_b) = (slopes[:k] / size).T, (slopes[k:] / size).T
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            det = db * ea - da * eb
-            step_a = (eb * gap[:, 0] - db * gap[:, 1]) / det
-            step_b = (ea * gap[:, 0] - da * gap[:, 1]) / det
+            # to first order the walls at a + step_a and at b + step_b are the same
+            det = dK_b * dB_a - dK_a * dB_b
+            step_a = (dB_b * gap[:, 0] - dK_b * gap[:, 1]) / det
+            step_b = (dB_a * gap[:, 0] - dK_a * gap[:, 1]) / det
             longest = np.maximum(np.abs(step_a) / _room(a), np.abs(step_b) / _room(b))
             share = np.minimum(1.0, LONGEST_STEP / longest)
         if not np.isfinite(longest).all():
@@ -564,12 +578,15 @@ def _self_crossings(curve: EdgeCurve, a: Floats, b: Floats, size: Floats) -> tup
 
 
 def _line_crossings(curve: EdgeCurve, a: Floats, h: float, w: float, size: Floats) -> tuple[Floats, bool]:
-    """Angles (k,) near a at which a curve crosses the line K + B w = h, and whether all are found."""
+    """Angles (k,) near a at which a curve crosses the line K + B w = h, and whether all are found.
+
+    size  (2,) of the edge [N/m, N s/m]
+    """
     if not len(a):
         return a, True
     scale = size[0] + size[1] * abs(w)
     for _ in range(MOST_STEPS):
-        walls, slopes = _slopes(curve, a)
+        walls, slopes = _walls_with_slopes(curve, a)
         gap = (walls[:, 0] + walls[:, 1] * w - h) / scale
         if np.max(np.abs(gap)) < SAME_WALL:
             return a, True

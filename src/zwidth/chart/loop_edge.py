@@ -193,10 +193,10 @@ class LoopEdge:
         memory = memory_of(tracer.table)
         status, _ = read_first(tracer.table, memory, ALL_NUMBERS, tracer.radius)
         if status == DOUBTFUL:
-            return cls._alone(tracer, None)
+            return cls._by_eigenvalues(tracer, None)
         crossed = crossed_between_samples(tracer, memory)
         if len(crossed):
-            return cls._alone(tracer, crossed)
+            return cls._by_eigenvalues(tracer, crossed)
         peak = None
         if status == FOUND:
             stiffness, damping, *t = memory.peak.tolist()
@@ -211,10 +211,13 @@ class LoopEdge:
         return edge
 
     @classmethod
-    def _alone(cls, tracer: Tracer, angles: Floats | None) -> LoopEdge:
-        """The edge by eigenvalues where rounding leaves a stage open, with samples at some angles besides."""
+    def _by_eigenvalues(cls, tracer: Tracer, angles: Floats | None) -> LoopEdge:
+        """The edge where rounding leaves a stage open: what is open is decided by eigenvalues.
+
+        angles  at which the curve is sampled besides its grid; None: at none
+        """
         arcs, blur = closed_rings(tracer, angles)
-        edge, blur = _judged(tracer, TracedEdge(arcs, {0: tracer}), blur, angles)
+        edge, blur = _judged_or_retraced(tracer, TracedEdge(arcs, {0: tracer}), blur, angles)
         numbers = edge.peak, edge.largest_damping(tracer.stable), edge.area
         return cls(tracer, edge.arcs, blur, *numbers, judged=edge)
 
@@ -242,7 +245,7 @@ class LoopEdge:
                 again = TracedEdge(arcs, {0: self.tracer})
         if again is self.judged:
             return again
-        drawn, _ = _judged(self.tracer, again, blur, angles)
+        drawn, _ = _judged_or_retraced(self.tracer, again, blur, angles)
         if drawn is not again and not self._has_numbers_of(drawn):
             raise ChartError(
                 "walls that eigenvalues find unstable lie within the edge of the stable set as it was read first, "
@@ -266,7 +269,9 @@ def _angles_of(edge: TracedEdge) -> Floats:
     return np.concatenate([thetas[1:-1] for thetas, _, _ in edge.arc_points])
 
 
-def _judged(tracer: Tracer, edge: TracedEdge, blur: float, angles: Floats | None) -> tuple[TracedEdge, float]:
+def _judged_or_retraced(
+    tracer: Tracer, edge: TracedEdge, blur: float, angles: Floats | None
+) -> tuple[TracedEdge, float]:
     """An edge all of whose walls are at the limit of stability, and its corners' blur: the one given, or where
     walls on it are not, the curve traced again through these.
 
@@ -322,8 +327,8 @@ class OffCircle(NamedTuple):
 
 
 def crossed_between_samples(tracer: Tracer, memory: EdgeMemory) -> Floats:
-    """Angles between two neighbouring samples of the edge whose walls are none of it: none, or a branch crosses
-    twice there."""
+    """Angles (k,) between neighbouring samples of the edge at which the wall is none of it, since a branch crosses
+    the edge twice there."""
     n, N = int(memory.counts[SAMPLES]), int(memory.circle.sizes[DEGREE])
     t, edge = memory.samples.t[:n], memory.samples.flag[:n] == EDGE
     first = np.flatnonzero(edge[1:] & edge[:-1])
@@ -339,11 +344,11 @@ def crossed_between_samples(tracer: Tracer, memory: EdgeMemory) -> Floats:
 
 
 def walls_off_circle(tracer: Tracer, edge: TracedEdge, corners: bool) -> OffCircle:
-    """Judge all points of an edge.
+    """Those of an edge's points whose largest root is not on the circle.
 
     corners  whether corners are known well enough to be judged, too: False where rounding blurs them
     """
-    suspects, judged = [np.empty((0, 3))], 0
+    suspects, judged = [np.empty((0, 3))], 0  # rows: angle (nan at a corner), K, B
     for kind, (thetas, K, B) in zip(edge.arcs.kind.tolist(), edge.arc_points, strict=True):
         judged += len(K)
         points = np.column_stack([thetas, K, B])
@@ -374,7 +379,8 @@ def _is_suspect(tracer: Tracer, points: Floats) -> Flags:
 
 
 def _distance_by_states(space: StateSpace, z: Complexes, K: Floats, B: Floats) -> Floats:
-    """|r/r'| at places z (k,) of walls (k,), by triangular matrices; not finite where z is a pole."""
+    """Distance |r/r'| from places z (k,) to the nearest roots of walls K, B (k,), one each, to first order (see
+    the file's head); not finite where z is a pole."""
     from scipy.linalg import matrix_balance, schur
 
     balanced, (scale, _) = matrix_balance(space.open, permute=False, separate=True)
@@ -383,6 +389,7 @@ def _distance_by_states(space: StateSpace, z: Complexes, K: Floats, B: Floats) -
     position, velocity = (each * scale @ Q for each in (space.position, space.velocity))
     f, n = np.multiply.outer(K, position) + np.multiply.outer(B, velocity), len(T)
     right, left = np.zeros((len(z), n), dtype=complex), np.zeros((len(z), n), dtype=complex)
+    # in the coordinates of T: right = (z - T)^-1 g, left = f (z - T)^-1, r = 1 + f right and r' = -left right
     with np.errstate(all="ignore"):
         for i in reversed(range(n)):
             right[:, i] = (force[i] + right[:, i + 1 :] @ T[i, i + 1 :]) / (z - T[i, i])

@@ -78,13 +78,14 @@ def _times(a: Floats, degree: int, f0: float, f1: float, f2: float) -> None:
 
 @compiled_lean
 def _set_to_one(a: Floats) -> None:
+    """Set the coefficients of a to those of the polynomial 1."""
     a[:] = 0.0
     a[0] = 1.0
 
 
 @compiled_lean
 def _add_product(a: Floats, n: int, b: Floats, m: int, out: Floats) -> None:
-    """out += a b, of degrees n and m."""
+    """Add the product of polynomials a and b, of degrees n and m, to out."""
     for i in range(n + 1):
         for j in range(m + 1):
             out[i + j] += a[i] * b[j]
@@ -92,7 +93,7 @@ def _add_product(a: Floats, n: int, b: Floats, m: int, out: Floats) -> None:
 
 @compiled_lean
 def _add_sizes(a: Floats, n: int, b: Floats, m: int, out: Floats) -> None:
-    """out += |a| |b|, coefficient by coefficient."""
+    """Add the sums of the sizes of the terms of each coefficient of a b, of degrees n and m, to out."""
     for i in range(n + 1):
         for j in range(m + 1):
             out[i + j] += abs(a[i] * b[j])
@@ -100,7 +101,11 @@ def _add_sizes(a: Floats, n: int, b: Floats, m: int, out: Floats) -> None:
 
 @compiled_apart
 def fill_computer_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
-    """What all loops of one computer share: numerators and denominators of the force path and of the estimate."""
+    """What all loops of one computer share: numerators and denominators of the force path and of the estimate.
+
+    Rows of `f.force` and `f.velocity` are order, numerator (3) and denominator (3) of a factor. In the bilinear
+    variable z = rho (1 + s)/(1 - s), so that each sample of delay is (1 - s) over rho (1 + s).
+    """
     parts, degrees, radius = out.parts, out.degrees, f.radius[0]
     for row in (FORCE_TOP, FORCE_BOTTOM, VELOCITY_TOP, VELOCITY_BOTTOM):
         _set_to_one(parts[row])
@@ -136,14 +141,14 @@ def fill_computer_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
 
 @compiled_lean
 def _fill_plant_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
-    """Numerator, the size of its terms, and denominator of the plant without delay and force path."""
+    """Fill in numerator, size of its terms, and denominator of the plant without delay and force path."""
     parts, radius, split = out.parts, f.radius[0], f.sizes[SPLIT]
     zeros, size, poles, beside, num = parts[ZEROS], parts[SIZE], parts[POLES], parts[BESIDE], parts[NUMERATOR]
     zeros[:], size[:] = 0.0, 0.0
     _set_to_one(poles)
     _set_to_one(beside)
     for k in range(f.sizes[SECTIONS]):
-        row = f.plant[k]
+        row = f.plant[k]  # denominator (3), numerators for the new and the old force (3 each), whether chained
         # denominators of the sections that a chain is not divided by, times (1 - s)^2 for each that it is
         if row[9] != 0.0:
             _times(beside, 2 * k - 2, 1.0, -2.0, 1.0)
@@ -151,6 +156,7 @@ def _fill_plant_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
             for i in range(2 * k + 1):
                 beside[i] = poles[i]
         num[0], num[1], num[2], num[3] = row[3], row[4], row[5], 0.0
+        # new + old / z, times z (1 - s)
         if split:
             _times(num, 2, radius, radius, 0.0)
             for i in range(3):
@@ -166,23 +172,23 @@ def _fill_plant_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
 
 @compiled_apart
 def fill_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
-    """A, S and V of a loop whose computer's polynomials stand already."""
+    """Fill in A, S and V of a loop, and what cancelled, where its computer's polynomials are in `out` already."""
     _fill_plant_polynomials(f, out)
     parts, degrees, coefficients, N = out.parts, out.degrees, out.coefficients, f.sizes[DEGREE]
-    spare, own, size = parts[SPARE], parts[BESIDE], parts[NUMERATOR]
+    spare, response_top, size = parts[SPARE], parts[BESIDE], parts[NUMERATOR]  # these rows are free again
     top, n = parts[FORCE_TOP], degrees[FORCE_TOP]
     # N_P with the force path's numerator; and what cancelled in it
-    own[:], size[:], spare[:] = 0.0, 0.0, 0.0
+    response_top[:], size[:], spare[:] = 0.0, 0.0, 0.0
     for i in range(degrees[ZEROS] + 1):
         spare[i] = max(parts[SIZE, i] - abs(parts[ZEROS, i]), 0.0)
-    _add_product(parts[ZEROS], degrees[ZEROS], top, n, own)
+    _add_product(parts[ZEROS], degrees[ZEROS], top, n, response_top)
     _add_sizes(spare, degrees[ZEROS], top, n, size)
     reached, e = degrees[ZEROS] + n, degrees[VELOCITY_TOP]
     for row in range(5):
         for i in range(N + 1):
             coefficients[row, i] = 0.0
-    _add_product(own, reached, parts[VELOCITY_BOTTOM], e, coefficients[S])
-    _add_product(own, reached, parts[VELOCITY_TOP], e, coefficients[V])
+    _add_product(response_top, reached, parts[VELOCITY_BOTTOM], e, coefficients[S])
+    _add_product(response_top, reached, parts[VELOCITY_TOP], e, coefficients[V])
     _add_sizes(size, reached, parts[VELOCITY_BOTTOM], e, coefficients[LOST_S])
     _add_sizes(size, reached, parts[VELOCITY_TOP], e, coefficients[LOST_V])
     spare[:] = 0.0
@@ -201,8 +207,8 @@ def polynomials_of_loop(circle: CircleFactors, out: LoopPolynomials) -> None:
 def fill_loop_polynomials(
     loops: LoopTable, i: int, radius: float, circle: CircleFactors, out: LoopPolynomials
 ) -> None:
-    """Factors and polynomials of loop i of a table on |z| = radius. What its computer alone decides is kept from
-    the loop before, if that has the same one."""
+    """Fill in factors and polynomials of loop i of a table on |z| = radius. What its computer alone decides is
+    kept from the loop before, if that has the same one."""
     computer = loops.computer[i]
     if circle.sizes[COMPUTER] != computer or circle.radius[0] != radius:
         fill_computer(loops, computer, radius, circle)
@@ -224,11 +230,11 @@ def work_array(degree: int) -> Floats:
 
 @compiled_lean
 def combine(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> None:
-    """p = A + K S + B V of degree N and its sizes, into rows 0 and 1."""
+    """Put p = A + K S + B V, of degree N, into row 0 of `room`, and the sums of its terms' sizes into row 1."""
     for i in range(N + 1):
-        a, s, v = polynomials[0, i], K * polynomials[1, i], B * polynomials[2, i]
+        a, s, v = polynomials[A, i], K * polynomials[S, i], B * polynomials[V, i]
         room[0, i] = a + s + v
-        room[1, i] = abs(a) + abs(s) + abs(v) + abs(K * polynomials[3, i]) + abs(B * polynomials[4, i])
+        room[1, i] = abs(a) + abs(s) + abs(v) + abs(K * polynomials[LOST_S, i]) + abs(B * polynomials[LOST_V, i])
 
 
 @compiled_lean
@@ -261,8 +267,9 @@ def deflate(room: Floats, degree: int, square: float) -> None:
 
 
 @compiled_lean
-def _start(room: Floats, row: int, degree: int, sign: float) -> None:
-    """The first two rows of Routh's array, into rows 4 and 5."""
+def _first_rows_of_routh(room: Floats, row: int, degree: int, sign: float) -> None:
+    """Put the first two rows of Routh's array of the polynomial in `row` of `room`, times sign, into its rows 4
+    and 5."""
     for i in range(degree // 2 + 2):
         j = degree - 2 * i
         room[4, i] = sign * room[row, j] if j >= 0 else 0.0
@@ -271,7 +278,7 @@ def _start(room: Floats, row: int, degree: int, sign: float) -> None:
 
 @compiled_lean
 def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
-    """Routh's array with one error bound for all of it: 1 or -1 where that settles the question, else 0.
+    """`hurwitz` with one error bound for all of Routh's array: 1 or -1 where that settles the question, else 0.
 
     The largest relative error is taken for every entry and grows by each cancellation.
     """
@@ -286,7 +293,7 @@ def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
             return 0
         if error * value < terms:
             error = terms / value
-    _start(room, row, degree, sign)
+    _first_rows_of_routh(room, row, degree, sign)
     for k in range(degree - 1):
         ratio = room[4, 0] / room[5, 0]
         before = room[4, 1]
@@ -325,7 +332,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
         hidden = hidden or not value > terms
     if hidden:
         return 0
-    _start(room, row, degree, sign)
+    _first_rows_of_routh(room, row, degree, sign)
     for i in range(degree // 2 + 2):
         j = degree - 2 * i
         room[6, i] = ROUNDING * room[row + 1, j] if j >= 0 else 0.0
@@ -361,14 +368,22 @@ def edges_stable_set(polynomials: Floats, N: int, t: float, K: float, B: float, 
 
 @compiled_lean
 def edges_on_line(polynomials: Floats, N: int, low_end: int, K: float, B: float, room: Floats) -> int:
-    """The same for a real root: without the lowest coefficient (low_end 1, root at s = 0) or the highest (0)."""
+    """Whether all roots of a wall but its real one on the circle lie inside: 1 yes, -1 no, 0 lost in rounding.
+
+    low_end  1: the real root is s = 0, and p is taken without its lowest coefficient; 0: infinity, without its
+             highest
+    """
     return quotient_flag(polynomials, N, low_end, N - 1, K, B, room)
 
 
 @compiled_lean
 def quotient_flag(polynomials: Floats, N: int, first: int, degree: int, K: float, B: float, room: Floats) -> int:
-    """The same for real roots at s = 0 and infinity: of the polynomial of this degree that is left of p, from its
-    coefficient `first` on."""
+    """Whether all roots of a wall but real ones at s = 0 and infinity lie inside: 1 yes, -1 no, 0 lost in
+    rounding.
+
+    first   how many coefficients of p are left out at the low end, one for each root s = 0
+    degree  of what is left of p, N less the roots left out
+    """
     combine(polynomials, N, K, B, room)
     for i in range(degree + 1):
         room[2, i], room[3, i] = room[0, i + first], room[1, i + first]

@@ -16,7 +16,7 @@ from zwidth.arrays import Bytes, Floats, Ints
 from zwidth.chart.arcs import PAIR
 from zwidth.chart.chart_numbers import fill_nodes
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
-from zwidth.chart.edge_memory import ARCS, EdgeMemory
+from zwidth.chart.edge_memory import ARCS, B_ROW, K_ROW, T_ROW, EdgeMemory
 from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
 from zwidth.loop.loop_table import (
     CircleFactors,
@@ -85,7 +85,7 @@ def add_node(nodes: EdgeNodes, K: float, B: float, t: float, piece: int, loop: i
 
 @compiled_apart
 def add_edge(memory: EdgeMemory, nodes: EdgeNodes, loop: int) -> bool:
-    """Add the nodes of the edge that stands in memory; False where memory is full."""
+    """Add the nodes of the edge in `memory`, that of loop number `loop`; False where memory for nodes is full."""
     arcs = memory.arcs
     for k in range(memory.counts[ARCS]):
         following = arcs.next_arc[k]
@@ -106,11 +106,14 @@ def add_edge(memory: EdgeMemory, nodes: EdgeNodes, loop: int) -> bool:
 
 @compiled_lean
 def _add_curve(memory: EdgeMemory, nodes: EdgeNodes, k: int, loop: int) -> bool:
-    """Add the nodes of arc k of the curve but for its last wall."""
+    """Add the nodes of arc k, a piece of the curve, but for its last wall; False where memory is full.
+
+    Each step from sample to sample goes from `from_t` to `to_t`, drawn in where the arc ends at a real root.
+    """
     circle, picked = memory.circle, memory.picked
     n = fill_nodes(memory, k)
-    t, K, B = picked[0], picked[1], picked[2]
-    at, K_slope, B_slope = t[0], 0.0, 0.0
+    t, K, B = picked[T_ROW], picked[K_ROW], picked[B_ROW]  # in the order of the walk
+    from_t, K_slope, B_slope = t[0], 0.0, 0.0  # slopes by theta at from_t
     for i in range(n - 1):
         turn = 1 if i == 0 else 0
         if not 0.0 < t[i] < np.inf:
@@ -121,40 +124,43 @@ def _add_curve(memory: EdgeMemory, nodes: EdgeNodes, k: int, loop: int) -> bool:
             x, y = wall_on_circle(circle, near)
             if not add_node(nodes, x, y, near, CURVE, loop, 0):
                 return False
-            at = near
+            from_t = near
         else:
             if not add_node(nodes, K[i], B[i], t[i], CURVE, loop, turn):
                 return False
-            at = t[i]
-        then, to_end = t[i + 1], not 0.0 < t[i + 1] < np.inf
+            from_t = t[i]
+        to_t, to_end = t[i + 1], not 0.0 < t[i + 1] < np.inf
         if to_end:
-            then = at * (NEAR_END if t[i + 1] == 0.0 else 1.0 / NEAR_END)
+            to_t = from_t * (NEAR_END if t[i + 1] == 0.0 else 1.0 / NEAR_END)
         if i == 0:
-            _, _, K_slope, B_slope = wall_with_slopes(circle, at)
-        _, _, next_K_slope, next_B_slope = wall_with_slopes(circle, then)
+            _, _, K_slope, B_slope = wall_with_slopes(circle, from_t)
+        _, _, next_K_slope, next_B_slope = wall_with_slopes(circle, to_t)
         of_K, of_B = K_slope * next_K_slope < 0.0, B_slope * next_B_slope < 0.0
-        if not _add_turns(circle, nodes, at, then, of_K, of_B, loop):
+        if not _add_turns(circle, nodes, from_t, to_t, of_K, of_B, loop):
             return False
         K_slope, B_slope = next_K_slope, next_B_slope
         if to_end:
-            x, y = wall_on_circle(circle, then)
-            if not add_node(nodes, x, y, then, STRAIGHT, loop, 0):
+            x, y = wall_on_circle(circle, to_t)
+            if not add_node(nodes, x, y, to_t, STRAIGHT, loop, 0):
                 return False
     return True
 
 
 @compiled_lean
 def _add_turns(
-    circle: CircleFactors, nodes: EdgeNodes, at: float, then: float, of_K: bool, of_B: bool, loop: int
+    circle: CircleFactors, nodes: EdgeNodes, from_t: float, to_t: float, of_K: bool, of_B: bool, loop: int
 ) -> bool:
-    """Add nodes where K, B or both turn between two t, in their order."""
-    one, other = np.nan, np.nan
+    """Add nodes where K, B or both turn between two t, in the order of the walk; False where memory is full.
+
+    of_K, of_B  whether K turns there, and whether B does
+    """
+    one, other = np.nan, np.nan  # t at which K turns, and t at which B does
     if of_K:
-        one = zero_between(circle, OF_SLOPE, NO_LINE, at, then)
+        one = zero_between(circle, OF_SLOPE, NO_LINE, from_t, to_t)
     if of_B:
-        other = zero_between(circle, OF_SLOPE_B, NO_LINE, at, then)
+        other = zero_between(circle, OF_SLOPE_B, NO_LINE, from_t, to_t)
     # nodes stand in the order in which the curve is walked
-    if of_K and of_B and abs(other - at) < abs(one - at):
+    if of_K and of_B and abs(other - from_t) < abs(one - from_t):
         one, other = other, one
     if of_K or of_B:
         for place in (one, other):
@@ -178,7 +184,9 @@ def add_crossings(
     """Add a node of the curve wherever a piece of it crosses K = low or K = high, at the place where its chord
     does; False where memory is full.
 
-    i, step  the loops are numbers i, i + step, ... of the table
+    i, step    the nodes' loops 0, 1, ... are numbers i, i + step, ... of the table
+    circle     working memory for the factors of a loop
+    low, high  [N/m]
     """
     filled, k = -1, 0
     while k < nodes.used[0] - 1:
@@ -190,9 +198,9 @@ def add_crossings(
                     continue
                 # nodes of one loop stand together, so that its factors are filled once
                 if filled != d:
-                    own = i + d * step
-                    fill_computer(loops, loops.computer[own], 1.0, circle)
-                    fill_plant(loops, own, circle)
+                    number = i + d * step
+                    fill_computer(loops, loops.computer[number], 1.0, circle)
+                    fill_plant(loops, number, circle)
                     filled = d
                 t = nodes.t[k] + (side - k0) / (k1 - k0) * (nodes.t[k + 1] - nodes.t[k])
                 if min(nodes.t[k], nodes.t[k + 1]) < t < max(nodes.t[k], nodes.t[k + 1]):
@@ -206,7 +214,7 @@ def add_crossings(
 
 @compiled_lean
 def copy_nodes(source: EdgeNodes, first: int, last: int, nodes: EdgeNodes) -> bool:
-    """Add nodes first to last - 1 of others; False where memory is full."""
+    """Add nodes first to last - 1 of `source` to `nodes`; False where memory is full."""
     n = nodes.used[0]
     if n + last - first > len(nodes.K):
         return False
@@ -250,9 +258,15 @@ def _piece_between(
 @compiled_apart
 def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: float) -> bool:
     """Whether there is a damping B >= 0 such that no edge meets the walls from K / factor to K factor and from
-    B / damping_factor to B damping_factor, and all of them are stable in all loops."""
+    B / damping_factor to B damping_factor, and all of them are stable in all loops.
+
+    The gap between dampings of edges in which these walls lie goes into `nodes.gap`. False, too, where memory for
+    the edges' parts is full.
+
+    count  number of loops
+    """
     low, high, parts, m = K / factor, K * factor, nodes.parts, 0
-    last = -2
+    last = -2  # the piece that meets the strip before this one
     for i in range(nodes.used[0] - 1):
         if nodes.piece[i] == NO_PIECE:
             continue
@@ -270,6 +284,7 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
             parts[m, 0], parts[m, 1] = least, largest
             m += 1
         last = i
+    # insertion sort by the least damping
     for k in range(1, m):
         least, largest, i = parts[k, 0], parts[k, 1], k
         while i > 0 and parts[i - 1, 0] > least:
@@ -294,8 +309,8 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
 def copy_pieces_near(
     nodes: EdgeNodes, close: EdgeNodes, low: float, high: float, bottom: float, top: float
 ) -> bool:
-    """Copy the pieces that may meet the walls between two stiffnesses and two dampings; False where memory is
-    full."""
+    """Copy into `close` the pieces that may meet the walls with stiffnesses low to high [N/m] and dampings bottom
+    to top [N s/m]; False where memory is full."""
     close.used[0], open_end = 0, -1
     for i in range(nodes.used[0] - 1):
         if nodes.piece[i] == NO_PIECE:
@@ -315,7 +330,8 @@ def copy_pieces_near(
 
 @compiled_apart
 def fits_about(close: EdgeNodes, K: float, factor: float, damping_factor: float, middle: float) -> bool:
-    """`fits` for the gap round a damping in the middle of it, which no edge of these pieces may reach."""
+    """`fits` for the one gap round the damping `middle`, by the pieces close to it alone; False where one of them
+    reaches `middle`. The gap goes into `close.gap`."""
     low, high, below, above = K / factor, K * factor, 0.0, np.inf
     for i in range(close.used[0] - 1):
         if close.piece[i] == NO_PIECE:
@@ -336,8 +352,8 @@ def fits_about(close: EdgeNodes, K: float, factor: float, damping_factor: float,
 
 @compiled_lean
 def _is_inside(nodes: EdgeNodes, count: int, K: float, B: float) -> bool:
-    """Whether a wall lies inside the edges of all loops: a ray towards stiffer walls crosses each an odd number of
-    times."""
+    """Whether a wall lies inside the edges of all loops, `count` of them: a ray towards stiffer walls crosses each
+    an odd number of times."""
     for d in range(count):
         inside = False
         for i in range(nodes.used[0] - 1):

@@ -44,9 +44,10 @@ def terms_at(circle: CircleFactors, theta: float) -> tuple[complex, complex, com
     Each factor of A is known times exp(-i theta/2) once for each of its roots: A is turned back by all N of them.
     """
     cc, ss, sc = half_angle(np.tan(0.5 * theta))
-    X, _, top, _ = minus_inverse_plant(circle, cc, ss, sc)
-    Y, _, size, _ = velocity_on_circle(circle, cc, ss, sc)
+    X, _, top, _ = minus_inverse_plant(circle, cc, ss, sc)  # -1/P = X / top
+    Y, _, size, _ = velocity_on_circle(circle, cc, ss, sc)  # w = Y / size
     P, w = divide(-top, X), scaled_factors(Y, 1.0 / size)
+    # A is scaled away, only its phase is kept: half of theta for each root, and that of each denominator
     turns = 0.5 * circle.sizes[DEGREE] * theta
     A = complex(np.cos(turns), np.sin(turns))
     for k in range(circle.sizes[SECTIONS]):
@@ -62,8 +63,13 @@ def terms_at(circle: CircleFactors, theta: float) -> tuple[complex, complex, com
 
 @compiled_lean
 def _times_denominators(A: complex, rows: Floats, count: int, cc: float, ss: float, sc: float) -> complex:
-    """A turned by the phase of the denominators of a computer's factors, whose sizes are left out."""
+    """A turned by the phase of the denominators of a computer's factors, whose sizes are left out.
+
+    rows, count   the factors as in `CircleFactors.force`, and how many
+    cc, ss, sc    cos^2, sin^2 and sin cos of theta/2
+    """
     for k in range(count):
+        # order, numerator (3), denominator (3)
         if rows[k, 0] == 1.0:
             den = complex(rows[k, 4] * np.sqrt(cc), rows[k, 5] * np.sqrt(ss))
         else:
@@ -90,13 +96,14 @@ def _phase_change(before: complex, after: complex) -> float:
 
 
 @compiled_lean
-def _side(theta: float, pair: float) -> float:
-    """Sign of cos theta - cos pair, at theta, of a pair of roots at angle `pair`; 1 without one (pair 0)."""
+def _sign_of_pair(theta: float, pair: float) -> float:
+    """Sign of cos theta - cos pair at theta, the factor of a pair of roots at angle `pair`; 1 if pair is 0:
+    none."""
     return -1.0 if 0.0 < pair < theta else 1.0
 
 
 @compiled_lean
-def _halved(
+def _phase_change_in_pieces(
     circle: CircleFactors,
     wall: tuple[float, float, float],
     low: float,
@@ -104,7 +111,12 @@ def _halved(
     start: complex,
     end: complex,
 ) -> float:
-    """Change of phase over a step, in as many pieces as it takes; nan where rounding is all that is left."""
+    """Change of the phase of p over a step of theta from low to high, in as many pieces as it takes; nan where
+    rounding is all that is left.
+
+    wall        K, B and the angle of a pair that is divided out, as for `roots_inside`
+    start, end  p, without the pair, at low and at high
+    """
     K, B, pair = wall
     total, position, value, length, pieces = 0.0, low, start, 0.5 * (high - low), 0
     while position < high:
@@ -116,7 +128,7 @@ def _halved(
         after = end
         if position + step < high:
             a, s, v = terms_at(circle, position + step)
-            after = (a + K * s + B * v) * _side(position + step, pair)
+            after = (a + K * s + B * v) * _sign_of_pair(position + step, pair)
         turn = _phase_change(value, after)
         # too large a turn to be sure of its sheet: the same step again, half as long
         if abs(turn) > FAR / 2.0:
@@ -145,13 +157,13 @@ def roots_inside(
         if abs(thetas[i] - pair) <= BESIDE * pair:
             continue
         # the pair (z - z0)(z - conj z0) = 2 z (cos theta - cos theta0) changes sign at theta0 and turns as z does
-        after = (terms[i, 0] + K * terms[i, 1] + B * terms[i, 2]) * _side(thetas[i], pair)
+        after = (terms[i, 0] + K * terms[i, 1] + B * terms[i, 2]) * _sign_of_pair(thetas[i], pair)
         if first < 0:
             first = i
         else:
             turn = _phase_change(before, after)
             if abs(turn) > FAR / 2.0:
-                turn = _halved(circle, wall, thetas[at], thetas[i], before, after)
+                turn = _phase_change_in_pieces(circle, wall, thetas[at], thetas[i], before, after)
             total += turn
         before, at = after, i
     # the pair turns as z does, z - rho and z + rho half as fast

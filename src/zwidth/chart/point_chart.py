@@ -55,8 +55,8 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
     A loop without sections is to be built alone, as `point[i].loop`: its posture is not OK, or its poles are such
     as compiled code does not treat.
 
-    coupled  False: to rounding. Loops whose dampers couple their modes, which are known to some ten digits here,
-             have no sections then either
+    coupled  True: with the loops whose dampers couple their modes, which are known to some ten digits here; False:
+             these have no sections either, so that all loops that have some are known to rounding
     Returns  None where that holds of every point: a measured response, a given plant of a single design or one
              that is reduced, encoders on the links in a reduced model, a computer with fixed feedback, a load,
              flexible links, a mechanism that is not plain (`effective_mass.is_plain`) in a reduced model
@@ -71,7 +71,12 @@ def tables_of_points(
     """`table_of_points` with each of several computers of one sampling period in place of the points' own."""
     point.require("dynamics", "sampling")
     model = point.model or "full"
-    if point.response is not None or point.controller.fixed_feedback or point.load is not None or _alone(point):
+    if (
+        point.response is not None
+        or point.controller.fixed_feedback
+        or point.load is not None
+        or _is_held_across(point)
+    ):
         return None
     if point.mechanism is None and (model != "full" or not point.shape):
         return None
@@ -79,7 +84,7 @@ def tables_of_points(
         return None
     if point.mechanism is not None and point.mechanism.flexible:
         return None
-    if point.mechanism is not None and not _known_together(point.mechanism, model):
+    if point.mechanism is not None and not _has_modes_in_batch(point.mechanism, model):
         return None
     if _is_held(point, model) and not coupled:
         return None
@@ -103,18 +108,19 @@ def modes_of_points(point: OperatingPoint) -> RenderedModes | None:
     if point.mechanism is not None and (
         point.mechanism.flexible
         or (point.encoders != "motor" and model != "full")
-        or not _known_together(point.mechanism, model)
+        or not _has_modes_in_batch(point.mechanism, model)
     ):
         return None
-    return _modes(point.flat if point.shape else point, model)
+    return _modes_without_operator(point.flat if point.shape else point, model)
 
 
 def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = True) -> PolePairs:
     """The plants of all points along one axis, held by their operator, as pairs of poles.
 
-    coupled  False: nan as reach for plants whose dampers couple their modes; nobody holds them
+    coupled  as for `table_of_points`; False: plants whose dampers couple their modes have nan as `reach`. For
+             points without an operator only
     """
-    modes, period = _modes(point, model), np.ravel(point.controller.sampling_period)
+    modes, period = _modes_without_operator(point, model), np.ravel(point.controller.sampling_period)
     if _is_held(point, model):
         return coupled_pairs(modes, point.operator, period)
     if modes.coupled is None or not modes.coupled.any():
@@ -122,27 +128,29 @@ def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = Tr
     if not coupled:
         return replace(modes.pairs, reach=np.where(modes.coupled, np.nan, modes.pairs.reach))
     rows = np.flatnonzero(modes.coupled)
-    own = period[rows] if len(period) > 1 else period
-    return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, own))
+    periods = period[rows] if len(period) > 1 else period
+    return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, periods))
 
 
-def _alone(point: OperatingPoint) -> bool:
-    """Whether the loop of each point is built alone: its operator holds more than the rendered direction."""
+def _is_held_across(point: OperatingPoint) -> bool:
+    """Whether the operator holds more than the rendered direction, or is an arm: the loop of each point is then
+    built by itself."""
     across = point.operator is not None and point.operator.directions == "all" and point.mechanism is not None
     return point.arm is not None or (across and (point.model or "full") == "full")
 
 
-def _known_together(mechanism: Mechanism, model: Model) -> bool:
+def _has_modes_in_batch(mechanism: Mechanism, model: Model) -> bool:
     """Whether the modes of a mechanism's many postures can be computed together."""
     return is_plain(mechanism) or (model == "full" and has_general_modes(mechanism))
 
 
 def _is_held(point: OperatingPoint, model: Model) -> bool:
-    """Whether an operator moves with the plants; the motor's mass alone has him fixed."""
+    """Whether the plants have an operator who moves with them: not in the model of the motor's mass, where the
+    handle does not move."""
     return point.operator is not None and model != "motor-mass"
 
 
-def _modes(point: OperatingPoint, model: Model) -> RenderedModes:
+def _modes_without_operator(point: OperatingPoint, model: Model) -> RenderedModes:
     """Modes of all points' plants, without operator, by the given plant or by the mechanism in its postures."""
     if point.given_plant is not None:
         return plant_modes(point.given_plant, point.shape)
@@ -215,23 +223,23 @@ def numbers_of_points(point: OperatingPoint, what: int, radius: Floats | None = 
     """
     key = __name__, what, None if radius is None else radius.tobytes()
     if key not in point.results:
-        point.results[key] = _numbers(point, what, None if radius is None else radius.ravel())
+        point.results[key] = _numbers_piece_by_piece(point, what, None if radius is None else radius.ravel())
     found: ChartNumbers | None = point.results[key]
     return found
 
 
-def _numbers(point: OperatingPoint, what: int, radius: Floats | None) -> ChartNumbers | None:
+def _numbers_piece_by_piece(point: OperatingPoint, what: int, radius: Floats | None) -> ChartNumbers | None:
     """`numbers_of_points`, computed anew for flat radii (N,): piece by piece, as many points as memory holds."""
     parts = []
     for at, piece in pieces_of_points(point):
         table = table_of_points(piece)
         if table is None:
             return None
-        parts.append(_compute(table, what, None if radius is None else radius[at]))
+        parts.append(_numbers_on_processor_in_use(table, what, None if radius is None else radius[at]))
     return ChartNumbers(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _compute(loops: LoopTable, what: int, radius: Floats | None) -> ChartNumbers:
+def _numbers_on_processor_in_use(loops: LoopTable, what: int, radius: Floats | None) -> ChartNumbers:
     """The numbers of each loop's chart, on the GPU if that is in use and all circles are the unit circle."""
     if processor_in_use() == "cpu" or radius is not None:
         return chart_numbers(loops, what, radius)

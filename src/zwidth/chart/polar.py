@@ -154,20 +154,21 @@ def largest_stiffness_by_direction(
     units = given / length
     if point.load is not None:
         point = replace(point, load=point.load.along_every_direction)
-    plant = _plants(point)
-    motions = _motions(point.jacobian)
+    plant = _plant_by_direction(point)
+    motions = _basis_of_motions(point.jacobian)
     keys = [_direction_key(unit, point.load is not None) for unit in units]
     first = {key: n for n, key in reversed(list(enumerate(keys)))}  # one of each pair
+    # how much of each direction is left outside of the handle's motions
     off = np.linalg.norm(units - units @ motions.T @ motions, axis=1) > OUT_OF_MOTION_TOLERANCE
     wanted = [n for n in first.values() if not off[n]]
-    together = _together(point, units[wanted])
+    in_batch = _stiffest_in_batch(point, units[wanted])
     rows: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
     done = 0
     for key, n in first.items():
         none = float("nan")
         rows[key] = none, none, none, OUT_OF_MOTION
         if not off[n]:
-            known = together[wanted.index(n)]
+            known = in_batch[wanted.index(n)]
             rows[key] = known if known is not None else _stiffest(plant, point.towards(units[n]))
         if progress is not None:
             done += keys.count(key)
@@ -176,8 +177,9 @@ def largest_stiffness_by_direction(
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
 
 
-def _together(point: OperatingPoint, units: Floats) -> list[tuple[float, float, float, str] | None]:
-    """K [N/m], B [N s/m], frequency [Hz], status for each unit vector (k, 3); None: to be traced alone."""
+def _stiffest_in_batch(point: OperatingPoint, units: Floats) -> list[tuple[float, float, float, str] | None]:
+    """K [N/m], B [N s/m], frequency [Hz] and status of the stiffest wall along each unit vector (k, 3), all charts
+    at once; None for a direction whose answer is in doubt."""
     assert point.posture is not None
     posture = point.posture.broadcast_to((len(units),))
     along = replace(point, posture=posture, directions=units[:, None, :], wall_matrices=None)
@@ -196,7 +198,10 @@ def _together(point: OperatingPoint, units: Floats) -> list[tuple[float, float, 
 
 
 def _direction_key(unit: Floats, one_way: bool) -> tuple[float, ...]:
-    """A key that is the same for a direction and its opposite, unless these differ."""
+    """A key of a unit vector (3,), the same for a direction and its opposite.
+
+    one_way  True: the two render different walls, as under load, and have keys of their own
+    """
     rounded = np.round(unit, 13) + 0.0
     if one_way:
         return tuple(rounded.tolist())
@@ -204,13 +209,13 @@ def _direction_key(unit: Floats, one_way: bool) -> tuple[float, ...]:
     return tuple((rounded * np.sign(lead) + 0.0).tolist())
 
 
-def _motions(jacobian: Floats) -> Floats:
+def _basis_of_motions(jacobian: Floats) -> Floats:
     """Orthonormal directions (m, 3) that span all along which the handle can move."""
     basis, size, _ = np.linalg.svd(jacobian)
     return np.asarray(basis.T[: len(size)][size > DEPENDENT * size[0]])
 
 
-def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
+def _plant_by_direction(point: OperatingPoint) -> Callable[[Floats], Plant]:
     """A function that gives the plant along a unit vector (3,).
 
     Directions share the full model's matrices and differ in their actuator.
@@ -218,7 +223,7 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
     if point.load is not None:
         return lambda unit: point.towards(unit).plant
     check_several_directions(point.mechanism, point.operator, point.encoders, None)
-    axes = _motions(point.jacobian)
+    axes = _basis_of_motions(point.jacobian)
     if point.model != "full" or not len(axes):
         return lambda unit: point.towards(unit).plant
     everywhere = replace(point, directions=axes, wall_matrices=None).plant_of_directions
@@ -226,7 +231,11 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
 
 
 def _stiffest(plant: Callable[[Floats], Plant], along: OperatingPoint) -> tuple[float, float, float, str]:
-    """K [N/m], B [N s/m], frequency [Hz], status of the stiffest wall along a point's direction."""
+    """K [N/m], B [N s/m], frequency [Hz] and status of the stiffest wall along a point's direction, traced by
+    itself.
+
+    plant  gives the plant along a unit vector (3,)
+    """
     none = float("nan")
     try:
         loop = Loop(plant(along.direction), along.computer)

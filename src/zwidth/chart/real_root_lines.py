@@ -11,6 +11,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.edge_memory import EdgeMemory
+from zwidth.chart.loop_polynomials import A, S, V
 from zwidth.compiled import compiled_lean
 from zwidth.loop.loop_table import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
 
@@ -29,7 +30,7 @@ def line_of(memory: EdgeMemory, root: float) -> tuple[float, float, float]:
     """
     column = 0 if root == 0.0 else memory.circle.sizes[DEGREE]
     polynomials = memory.polynomials.coefficients
-    return polynomials[0, column], polynomials[1, column], polynomials[2, column]
+    return polynomials[A, column], polynomials[S, column], polynomials[V, column]
 
 
 @compiled_lean
@@ -38,7 +39,7 @@ def sum_of_coefficients(memory: EdgeMemory) -> float:
     is infinite)."""
     total = 0.0
     for i in range(memory.circle.sizes[DEGREE] + 1):
-        total += memory.polynomials.coefficients[0, i]
+        total += memory.polynomials.coefficients[A, i]
     return total
 
 
@@ -51,13 +52,13 @@ def curve_end(memory: EdgeMemory, root: float) -> tuple[float, float, bool]:
 
 @compiled_lean
 def end_of_curve(polynomials: Floats, N: int, root: float) -> tuple[float, float, bool]:
-    """`curve_end` of a loop of degree N.
+    """`curve_end` of a loop of degree N: K, B, and whether there is such a wall.
 
     There the two outermost coefficients of p vanish together: two linear equations.
     """
-    i, j = (0, 1) if root == 0.0 else (N, N - 1)
-    a, s, v = polynomials[0, i], polynomials[1, i], polynomials[2, i]
-    b, p, q = polynomials[0, j], polynomials[1, j], polynomials[2, j]
+    i, j = (0, 1) if root == 0.0 else (N, N - 1)  # of the two coefficients
+    a, s, v = polynomials[A, i], polynomials[S, i], polynomials[V, i]
+    b, p, q = polynomials[A, j], polynomials[S, j], polynomials[V, j]
     return _intersection(a, s, v, b, p, q)
 
 
@@ -91,9 +92,9 @@ def wall_on_line(circle: CircleFactors, line: tuple[float, float, float], t: flo
     theta = 2.0 * np.arctan(t)
     off, slope = a + s * K + v * B, s * dK + v * dB
     for beside in (t * (1.0 - LAST_DIGITS), t * (1.0 + LAST_DIGITS)):
-        k, b = wall_on_circle(circle, beside)
+        K_beside, B_beside = wall_on_circle(circle, beside)
         # t is the crossing to its last digit only if the curve is farther from the line on either side
-        if not abs(a + s * k + v * b) > abs(off):
+        if not abs(a + s * K_beside + v * B_beside) > abs(off):
             return K, B
     step = -off / slope if slope != 0.0 else 0.0
     if abs(step) <= LAST_DIGITS * theta:

@@ -27,7 +27,8 @@ def spread_roots(roots: Complexes) -> None:
 
 @compiled_apart
 def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
-    """The roots of p(s), ascending coefficients, by Aberth's iteration until no root moves by more than its share.
+    """The roots of p(s), ascending coefficients, by Aberth's iteration until no root moves by more than
+    the share `tolerance` of its size, at most 30 times.
 
     roots  (N,) starting values in the s plane, replaced by the roots; warm starts take a few rounds
     """
@@ -49,6 +50,7 @@ def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
                     slope = slope * t + value
                     value = value * t + p[k]
                 newton = s * divide(value, N * value - t * slope)
+            # Aberth's correction of Newton's step for the other roots
             pull = complex(0.0, 0.0)
             for j in range(N):
                 gap = s - roots[j]
@@ -89,7 +91,8 @@ def real_root(p: Floats) -> float:
 
 @compiled
 def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
-    """Largest |z| over the roots of p(s), see `find_roots`; 1e300 where it is no number."""
+    """Largest |z| over the roots of p(s), z = radius (1 + s)/(1 - s), see `find_roots`; 1e300 where it is no
+    number."""
     find_roots(p, roots, 1e-9)
     one, out = complex(1.0, 0.0), 0.0
     for i in range(len(p) - 1):

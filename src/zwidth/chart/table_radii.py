@@ -78,28 +78,32 @@ def _radii(loops: LoopTable, which: Ints, K: Floats, B: Floats, leverage: bool) 
         finite = np.isfinite(L).all(axis=(-2, -1))
         z = np.linalg.eigvals(L[finite]).astype(np.complex128)
         radii[walls[finite]] = np.abs(z).max(axis=-1)
-        free = finite & (K[walls] == 0.0)
-        if np.any(free):
-            radii[walls[free]] = _without_position(loops, which[walls[free]], z[free[finite]])
+        soft = finite & (K[walls] == 0.0)
+        if np.any(soft):
+            radii[walls[soft]] = _radii_without_positions(loops, which[walls[soft]], z[soft[finite]])
         if leverage:
             leverages[walls[finite]] = _leverages(z, states[np.flatnonzero(finite)])
     return radii, leverages
 
 
-def _without_position(loops: LoopTable, which: Ints, z: Complexes) -> Floats:
+def _radii_without_positions(loops: LoopTable, which: Ints, z: Complexes) -> Floats:
     """Radii (p,) of roots (p, N) of walls without stiffness, the root z = 1 of each motion without a spring set
-    aside (`unheld_positions`); nan where rounding leaves open whether there is one."""
+    aside (`unheld_positions`); nan where rounding leaves open whether there is one.
+
+    which  (p,) number of each wall's loop
+    """
+    # such a motion is a section with d0 = 0, the second number of its row
     rows = np.arange(loops.rows.shape[1]) < loops.section_count[which][:, None]
     count = np.count_nonzero(rows & (loops.rows[which, :, 1] == 0.0), axis=1)
     radii = np.abs(z).max(axis=-1)
-    for own in np.unique(count[count > 0]):
-        radii[count == own] = np.abs(set_aside(z[count == own], int(own))).max(axis=-1)
+    for positions in np.unique(count[count > 0]):
+        radii[count == positions] = np.abs(set_aside(z[count == positions], int(positions))).max(axis=-1)
     return np.where((count == 0) & (np.abs(radii - 1.0) < AT_ONE), np.nan, radii)
 
 
 def _batches(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpace]]:
-    """Walls of loops of one structure, and the states of each one's loop; walls of loops without sections are in
-    none. Raises ValueError for chained sections."""
+    """Numbers (k,) of walls of loops of one structure, and the k state spaces of their loops, batch after batch;
+    walls of loops without sections are in none. Raises ValueError for chained sections."""
     for first in range(0, len(which), BATCH_SIZE):
         batch = np.arange(first, min(first + BATCH_SIZE, len(which)))
         alike, place = np.unique(which[batch], return_inverse=True)

@@ -101,7 +101,7 @@ class Tracer:
 
     def sample_angles(self, share: float, longest: float | None = None) -> Floats:
         """Ascending angles in (0, pi) whose steps are `share` of the distance to the curve's nearest
-        singularity."""
+        singularity, and at most `longest` [rad]; None: `longest_step`."""
         longest = self.longest_step if longest is None else longest
         t, found = np.empty(MOST_SAMPLES), feature_memory(self.degree, int(self.circle.sizes[WINDOW]))
         count = samples_of_loop(self.circle, self.all_polynomials, found, share, longest, t)
@@ -116,11 +116,14 @@ class Tracer:
         return walls(self.circle, thetas)
 
     def angles(self, parameters: Floats) -> Floats:
-        """The parameters themselves, which are angles."""
+        """The parameters themselves (`arcs.Curve.angles`): this curve is given by its angles."""
         return parameters
 
     def zeros(self, arc: Arc, component: int) -> Floats:
-        """Ascending angles on an arc at which K, B or dK/dtheta changes sign, to rounding."""
+        """Ascending angles on an arc at which K, B or dK/dtheta changes sign, to rounding.
+
+        component  STIFFNESS, DAMPING or SLOPE of `arcs`
+        """
         t, ends = np.tan(0.5 * arc.angles), np.array([arc.first, arc.last])
         order = slice(None) if arc.start < arc.end else slice(None, None, -1)
         zeros = sign_changes(self.circle, t[order].copy(), ends[order].copy(), component)
@@ -156,7 +159,7 @@ class Tracer:
         return self.degree > MOST_DEGREE
 
     @cached_property
-    def _circle(self) -> tuple[Floats, Complexes]:
+    def _circle_samples(self) -> tuple[Floats, Complexes]:
         """Angles (n,) of samples of the circle, and A, A P, A P w (n, 3) there, for `flags_by_phase`."""
         thetas = self.sample_angles(0.2)
         # soft walls have roots as near to z = 1 as one likes
@@ -165,8 +168,12 @@ class Tracer:
         return thetas, terms_along(self.circle, thetas)
 
     def flags_by_phase(self, points: Floats, pairs: Floats, real: int) -> NDArray[np.int8]:
-        """Flags of walls (n, 2) by the phase along the circle, see `nyquist.phase_flags`."""
-        flags = phase_flags(self.circle, *self._circle, self.degree, points, pairs, real)
+        """Flags of walls (n, 2) by the phase along the circle: EDGE where all roots but those divided out are
+        inside, NO_EDGE where one is not, HIDDEN where rounding leaves it open.
+
+        pairs, real  the roots divided out, as for `nyquist.phase_flags`
+        """
+        flags = phase_flags(self.circle, *self._circle_samples, self.degree, points, pairs, real)
         return np.asarray(flags, dtype=np.int8)
 
     @property
@@ -176,7 +183,8 @@ class Tracer:
         return min(LONGEST, 0.5 / float(late))
 
     def edge_flag(self, theta: float) -> int:
-        """Whether the wall at one angle edges the stable set: 1, -1, or 0 where nothing can tell."""
+        """Whether the wall at one angle edges the stable set: EDGE, NO_EDGE, or HIDDEN where eigenvalues cannot
+        tell either."""
         one = np.array([theta])
         K, B, flags = self.trace(one)
         return int(flags[0] or self.edge_by_eigenvalues(one, K, B)[0])
@@ -253,6 +261,7 @@ def dense_points(circle: CircleFactors, t: Floats, ends: Floats) -> tuple[Floats
     for i in range(n):
         nodes[i] = 2.0 * np.arctan(t[i])
     low, high, count = nodes[0], nodes[n - 1], n
+    # a node on either side of each crossing of an axis, inserted in its order
     for zeros in (K_zeros, B_zeros):
         for zero in zeros:
             for share in (1.0 - BESIDE_AXIS, 1.0 + BESIDE_AXIS):
@@ -271,7 +280,8 @@ def dense_points(circle: CircleFactors, t: Floats, ends: Floats) -> tuple[Floats
 
 @compiled
 def _refined_angles(circle: CircleFactors, nodes: Floats, tolerance: float, most: int) -> Floats:
-    """Angles strictly between the first and last node, each interval cut so that chords stay within tolerance.
+    """Angles strictly between the first and last of ascending angles, each interval cut so that chords stay within
+    tolerance, a share of the extent in K and in B; no more than `most` are added to the nodes.
 
     The sag of a chord over a step h is h^2/8 times the second derivative; the middle of each interval measures it,
     and n equal pieces divide it by n^2.
@@ -310,7 +320,8 @@ def sign_changes(circle: CircleFactors, t: Floats, ends: Floats, component: int)
     n, m = len(t), 0
     out, values = np.empty(n), np.empty(n)
     for i in range(1, n - 1):
-        values[i] = wall_with_slopes(circle, t[i])[component]
+        values[i] = wall_with_slopes(circle, t[i])[component]  # of K, B, dK/dtheta, dB/dtheta
+    # from the ends drawn in: there K or B may touch an axis, and the slope has no value at t = 0 and inf
     if component == OF_SLOPE:
         low, high = t[0] + END_MARGIN * (t[1] - t[0]), t[n - 1] - END_MARGIN * (t[n - 1] - t[n - 2])
         low, high = max(low, END_MARGIN * t[1]), min(high, t[n - 2] / END_MARGIN)

@@ -141,7 +141,7 @@ def verdicts(
     judged = []
     for first in range(0, max(K.size, 1), BATCH_SIZE):
         walls = slice(first, first + BATCH_SIZE)
-        judged.append(_judged(loop, K.ravel()[walls], B.ravel()[walls]))
+        judged.append(_judge_batch(loop, K.ravel()[walls], B.ravel()[walls]))
         if progress is not None:
             progress("walls", min(first + BATCH_SIZE, K.size), K.size)
     verdict, frequency, radius, width = (
@@ -156,7 +156,7 @@ def _unheld(loop: Loop | MultiLoop, K: Floats) -> Ints:
     return np.where(free, unheld_positions(loop) if np.any(free) else 0, 0)
 
 
-def _judged(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.int8], Floats, Floats, Floats]:
+def _judge_batch(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.int8], Floats, Floats, Floats]:
     """Verdict, frequency, spectral radius and half-width of the undecided band of walls (k,)."""
     finite = np.isfinite(K) & np.isfinite(B)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -249,15 +249,17 @@ def distances_from_circle(
         z = np.linalg.eigvals(L)
         some = np.abs(z).max(axis=-1) - radius
         for k in np.flatnonzero(np.abs(some) > band).tolist():
-            if abs(_joined(z[k], radius)) <= band:
+            # two roots that meet on the circle, set apart by the last digits of the wall
+            if abs(_distance_of_mean(z[k], radius)) <= band:
                 continue
             if abs(some[k]) > rounding_of_roots(L[k], rounding=WALL_ROUNDING):
                 away[first + k] = some[k]
     return away
 
 
-def _joined(z: NDArray[Any], radius: float) -> float:
-    """How far outside the circle the largest of roots z (n,) is, it and a neighbour taken as their mean."""
+def _distance_of_mean(z: NDArray[Any], radius: float) -> float:
+    """How far outside the circle |z| = radius the largest of roots z (n,) is, negative inside; it and a neighbour
+    within TOGETHER taken as their mean."""
     top = int(np.argmax(np.abs(z)))
     beside = np.abs(z - z[top])
     beside[top] = np.inf

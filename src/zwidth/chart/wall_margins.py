@@ -86,8 +86,8 @@ def stiffness_with_margins(
     def several(first: int, last: int) -> None:
         """Fill `out` and `status` for devices first to last - 1, in the thread's own memory."""
         if not hasattr(own, "memory"):
-            own.memory = _memory(loops, delays)
-        _several(loops, delays, stiffness_margin, damping_margin, own.memory, out, status, first, last)
+            own.memory = _margin_memory(loops, delays)
+        _fill_several(loops, delays, stiffness_margin, damping_margin, own.memory, out, status, first, last)
 
     in_chunks(several, N)
     return out, status
@@ -112,7 +112,7 @@ class MarginMemory(NamedTuple):
     tried: Floats
 
 
-def _memory(loops: LoopTable, delays: int) -> MarginMemory:
+def _margin_memory(loops: LoopTable, delays: int) -> MarginMemory:
     """Working memory for any of these devices, each with its edges at so many delays."""
     return MarginMemory(
         edge_memory(loops, MOST_DEGREE, MOST_SAMPLES),
@@ -126,7 +126,7 @@ def _memory(loops: LoopTable, delays: int) -> MarginMemory:
 
 
 @compiled
-def _several(
+def _fill_several(
     loops: LoopTable,
     delays: int,
     stiffness_margin: Floats,
@@ -137,7 +137,8 @@ def _several(
     first: int,
     last: int,
 ) -> None:
-    """Devices first to last - 1, BLOCK of them at a time."""
+    """Fill `out`, stiffness and damping of each device, and `status` for devices first to last - 1, BLOCK of them
+    at a time."""
     memory.edge.circle.sizes[COMPUTER] = -1
     N = len(loops.rows) // delays
     for begin in range(first, last, BLOCK):
@@ -154,8 +155,8 @@ def _several(
             if status[i] != FOUND:
                 continue
             a, b = 1.0 + stiffness_margin[i], 1.0 + damping_margin[i]
-            stiffness = _stiffest(memory.nodes, delays, a, b, memory.tried)
-            stiffness, settled = _refined(loops, i, N, delays, memory, a, b, stiffness)
+            stiffness = _stiffest_fit(memory.nodes, delays, a, b, memory.tried)
+            stiffness, settled = _refined_stiffness(loops, i, N, delays, memory, a, b, stiffness)
             status[i] = (FOUND if stiffness > 0.0 else NO_WALL) if settled else DOUBTFUL
             if status[i] == FOUND:
                 out[i, 0], out[i, 1] = stiffness, _damping_in_gap(memory.close, b)
@@ -163,7 +164,7 @@ def _several(
 
 @compiled_lean
 def _damping_in_gap(nodes: EdgeNodes, b: float) -> float:
-    """Damping of the wall in the middle of those that fitted last, whose B/b .. B b lie in the gap."""
+    """Damping B [N s/m] of the wall in the middle of those whose B/b .. B b lie in the gap that fitted last."""
     low, high = b * nodes.gap[0], nodes.gap[1] / b
     return float(np.sqrt(low * high)) if low > 0.0 else 0.5 * high
 
@@ -178,8 +179,9 @@ def _fill_edges(
     memory: MarginMemory,
     status: NDArray[np.uint8],
 ) -> None:
-    """Put edges of devices begin to end - 1 in the pool: of all of them at one delay after the other, since what
-    the computer alone decides is then computed once. NO_WALL where there is none at one of the delays."""
+    """Put edges of devices begin to end - 1, of N at so many delays, in the pool: of all of them at one delay
+    after the other, since what the computer alone decides is then computed once. NO_WALL where there is none at
+    one of the delays."""
     pool, ends = memory.pool, memory.ends
     pool.used[0], ends[0] = 0, 0
     for i in range(begin, end):
@@ -193,11 +195,11 @@ def _fill_edges(
 
 
 @compiled_apart
-def _add_edge_of(loops: LoopTable, own: int, d: int, memory: MarginMemory) -> int:
-    """Add the edge of loop `own`, of its device at delay d, to the pool: FOUND, NO_WALL or DOUBTFUL."""
-    if loops.section_count[own] == 0 or degree_of(loops, own) > MOST_DEGREE:
+def _add_edge_of(loops: LoopTable, number: int, d: int, memory: MarginMemory) -> int:
+    """Add the edge of loop `number`, of a device at delay number d, to the pool: FOUND, NO_WALL or DOUBTFUL."""
+    if loops.section_count[number] == 0 or degree_of(loops, number) > MOST_DEGREE:
         return DOUBTFUL
-    fill_loop(loops, own, 1.0, memory.edge)
+    fill_loop(loops, number, 1.0, memory.edge)
     status = read_edge(memory.edge)
     if status != FOUND:
         return status
@@ -205,8 +207,12 @@ def _add_edge_of(loops: LoopTable, own: int, d: int, memory: MarginMemory) -> in
 
 
 @compiled_apart
-def _stiffest(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floats) -> float:
-    """Stiffness [N/m] of the stiffest wall that fits between the edges with margins a, b; 0 if none does."""
+def _stiffest_fit(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floats) -> float:
+    """Stiffness [N/m] of the stiffest wall that fits between the edges; 0 if none does.
+
+    a, b   the factors by which stiffness and damping may be off
+    tried  working memory for stiffnesses
+    """
     n, top = nodes.used[0], np.inf
     for d in range(delays):
         largest = 0.0
@@ -231,20 +237,20 @@ def _stiffest(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floats) 
     for k in range(m - 1, -1, -1):
         for K in (0.5 * (above + tried[k]), tried[k]):
             if above > K and fits(nodes, delays, K, a, b):
-                return _halved(nodes, delays, a, b, 0.0, K, above, COARSE)
+                return _largest_fit_between(nodes, delays, a, b, 0.0, K, above, COARSE)
             above = min(above, K)
     # the least tried may be above the only ones that fit
     for _ in range(40):
         K = 0.5 * above
         if fits(nodes, delays, K, a, b):
-            return _halved(nodes, delays, a, b, 0.0, K, above, COARSE)
+            return _largest_fit_between(nodes, delays, a, b, 0.0, K, above, COARSE)
         above = K
     return 0.0
 
 
 @compiled_lean
 def _sort(values: Floats, n: int) -> None:
-    """Ascending order of the first n values, by Shell's method."""
+    """Put the first n values in ascending order, by Shell's method."""
     gap = n // 2
     while gap > 0:
         for k in range(gap, n):
@@ -257,11 +263,13 @@ def _sort(values: Floats, n: int) -> None:
 
 
 @compiled_apart
-def _halved(
+def _largest_fit_between(
     nodes: EdgeNodes, delays: int, a: float, b: float, middle: float, low: float, high: float, tolerance: float
 ) -> float:
-    """The stiffness between one that fits and one that does not at which that changes, to a relative tolerance.
+    """The stiffness between low, which fits, and high, which does not, at which that changes, by halving to a
+    relative tolerance. Its gap is in `nodes` then.
 
+    a, b    the factors by which stiffness and damping may be off
     middle  damping in the middle of the gap that is looked at; 0: whichever gap
     """
     while high - low > tolerance * high:
@@ -272,21 +280,26 @@ def _halved(
             low = between
         else:
             high = between
-    _fits(nodes, delays, a, b, middle, low)  # its gap stands
+    _fits(nodes, delays, a, b, middle, low)  # so that `nodes` has its gap
     return low
 
 
 @compiled_lean
 def _fits(nodes: EdgeNodes, delays: int, a: float, b: float, middle: float, K: float) -> bool:
+    """`fits_about` a damping in the middle of a gap; `fits`, for whichever gap, where middle is 0."""
     return fits_about(nodes, K, a, b, middle) if middle > 0.0 else fits(nodes, delays, K, a, b)
 
 
 @compiled_apart
-def _refined(
+def _refined_stiffness(
     loops: LoopTable, i: int, N: int, delays: int, memory: MarginMemory, a: float, b: float, stiffness: float
 ) -> tuple[float, bool]:
-    """The wall solved again with nodes where the strip's sides cross the curves, until it does not change; and
-    whether it settled. Where the gap is wide, only with the pieces close to it."""
+    """The stiffness solved again with nodes where the strip's sides cross the curves, until it does not change;
+    and whether it settled. Where the gap is wide, only with the pieces close to it. Its gap goes into
+    `memory.close`.
+
+    a, b  the factors by which stiffness and damping may be off
+    """
     if stiffness == 0.0:
         return 0.0, True
     low, high = memory.nodes.gap[0], memory.nodes.gap[1]
@@ -295,17 +308,19 @@ def _refined(
         middle = _damping_in_gap(memory.nodes, b)
         near = stiffness * (1.0 - BESIDE) / a, stiffness * (1.0 + BESIDE) * a
         if copy_pieces_near(memory.nodes, memory.close, *near, low / b, high * b):
-            found, settled = _settled(loops, i, N, delays, memory.close, memory.circle, a, b, middle, stiffness)
+            found, settled = _settled_stiffness(
+                loops, i, N, delays, memory.close, memory.circle, a, b, middle, stiffness
+            )
             if settled:
                 return found, True
-    found, settled = _settled(loops, i, N, delays, memory.nodes, memory.circle, a, b, 0.0, stiffness)
+    found, settled = _settled_stiffness(loops, i, N, delays, memory.nodes, memory.circle, a, b, 0.0, stiffness)
     for c in range(2):
         memory.close.gap[c] = memory.nodes.gap[c]
     return found, settled
 
 
 @compiled_apart
-def _settled(
+def _settled_stiffness(
     loops: LoopTable,
     i: int,
     N: int,
@@ -317,7 +332,11 @@ def _settled(
     middle: float,
     stiffness: float,
 ) -> tuple[float, bool]:
-    """`_refined` with the pieces in `nodes`, whose crossings it adds: stiffness, and whether it settled."""
+    """`_refined_stiffness` with the pieces in `nodes`, whose crossings it adds: stiffness, and whether it settled.
+
+    middle  as for `_largest_fit_between`
+    """
+    # half: relative half-width of the interval in which the stiffness is looked for, opened until it changes there
     tolerance, half, widest = COARSE, 10.0 * COARSE, BESIDE if middle > 0.0 else 0.5
     for _ in range(ROUNDS):
         if not add_crossings(nodes, loops, i, N, circle, stiffness / a, stiffness * a):
@@ -331,7 +350,7 @@ def _settled(
         if not half < widest:
             return 0.0, False
         tolerance = max(FINEST, 1e-3 * tolerance)
-        stiffness = _halved(nodes, delays, a, b, middle, low, high, tolerance)
+        stiffness = _largest_fit_between(nodes, delays, a, b, middle, low, high, tolerance)
         change = abs(stiffness / before - 1.0)
         if tolerance == FINEST and change <= SETTLED:
             return stiffness, True
@@ -357,7 +376,10 @@ def stiffness_with_margins_alone(
 
 def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float, float] | None:
     """`stiffness_with_margins_alone` with edges as chords (`tracer.CHORD`), where compiled stages are in
-    doubt."""
+    doubt.
+
+    a, b  the factors by which stiffness and damping may be off
+    """
     tracers = [Tracer(loop) for loop in loops]
     outlines = [TracedEdge(closed_rings(tracer)[0], {0: tracer}).outlines for tracer in tracers]
     size = sum(len(outline) for each in outlines for outline in each)
@@ -368,8 +390,10 @@ def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float,
             for n, (K, B) in enumerate(outline.tolist()):
                 piece = STRAIGHT if n < len(outline) - 1 else NO_PIECE
                 add_node(nodes, K, B, 0.0, piece, d, int(n == 0 or (n < len(turns) and turns[n])))
-    stiffness = _stiffest(nodes, len(loops), a, b, np.empty(2 * len(nodes.K) + STEPS))
+    stiffness = _stiffest_fit(nodes, len(loops), a, b, np.empty(2 * len(nodes.K) + STEPS))
     if not stiffness > 0.0:
         return None
-    stiffness = float(_halved(nodes, len(loops), a, b, 0.0, stiffness, stiffness * (1.0 + 2.0 * COARSE), FINEST))
+    stiffness = float(
+        _largest_fit_between(nodes, len(loops), a, b, 0.0, stiffness, stiffness * (1.0 + 2.0 * COARSE), FINEST)
+    )
     return stiffness, float(_damping_in_gap(nodes, b))

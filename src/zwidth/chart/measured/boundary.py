@@ -73,14 +73,14 @@ def first_measured_angles(loop: MeasuredLoop) -> Floats:
         parts.append(np.pi - closing[::-1] * (np.pi - measured[-1]))
     angles = np.unique(np.concatenate(parts))
     dense = np.union1d(angles, np.linspace(angles[0], loop.largest_angle, 4097)[:-1])
-    for low, high in _sign_changes(loop, dense):
+    for low, high in _brackets_of_real_estimate(loop, dense):
         steps = closing * (high - low + 1e-3 * high)
         angles = np.concatenate([angles, low - steps, high + steps])
     angles = np.unique(angles)
     return angles[(angles > 0.0) & (angles < np.pi) & (angles <= loop.largest_angle)]
 
 
-def _sign_changes(loop: MeasuredLoop, angles: Floats) -> list[tuple[float, float]]:
+def _brackets_of_real_estimate(loop: MeasuredLoop, angles: Floats) -> list[tuple[float, float]]:
     """Brackets, closed to rounding, of the angles where Im w = 0: there the curve passes through infinity."""
     positive = loop.w(angles).imag > 0.0
     at = np.flatnonzero(positive[1:] != positive[:-1])
@@ -145,6 +145,8 @@ def _bisect_chords(
         middle = 0.5 * (angles[at] + angles[at + 1])
         Km, Bm, _ = loop.walls(middle)
         scale = scales(middle)
+        # middle m on the curve and ends a, b of each chord, scaled; off: distance of m from the chord; reach: its
+        # foot's share of the chord
         m = (np.column_stack([Km, Bm]) - low) / scale
         a, b = points[at] / scale, points[at + 1] / scale
         along, to = b - a, m - a
@@ -218,7 +220,8 @@ def measured_real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
 
 
 def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Ints, Ints]:
-    """The line of real roots, cut where the curve ends on it: there the count's jump changes its sign.
+    """The line of real roots, as segments, jumps and angle indices of `Boundary`, cut where the curve ends on it:
+    there the count's jump changes its sign.
 
     On it D = K + B w - h = 0. The root moves by -dK / D', and D' (z = +-1) has the sign of -+(B Im w - Im h)
     at an angle just beside.
@@ -241,7 +244,8 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
 
 
 def _open_end(segments: Floats, jumps: Ints, far: float) -> tuple[Floats, Ints, Ints]:
-    """The curve continued straight to infinity where the data end: higher frequencies are not seen."""
+    """The curve continued straight to infinity where the data end, as segments, jumps and angle indices of
+    `Boundary`: higher frequencies are not seen."""
     Ka, Ba, Kb, Bb = segments[-1]
     reach = far / max(abs(Kb - Ka), abs(Bb - Ba))
     onward = [[Kb, Bb, Kb + reach * (Kb - Ka), Bb + reach * (Bb - Ba)]]
@@ -258,6 +262,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[In
     Returns  (n,) counts, and the least |1 + L| / (1 + |L|) along the way (n,): near 0 the count is not sure
     """
     h, w = measured_real_root(loop, -1)
+    # sign of 1 + L at z = 1, but for the integrators
     static = np.sign(walls[:, 0]) if loop.integrators else np.sign(1.0 - (walls[:, 0] + walls[:, 1] * w) / h)
     start = np.where(static > 0.0, 0.0, np.pi)
     turn, clear, last = np.empty(len(walls)), np.empty(len(walls)), np.empty(len(walls), dtype=np.complex128)
@@ -395,9 +400,10 @@ def roots_outside(segments: Floats, jumps: Ints, reference: Floats, count: int, 
             ax, ay = segments[k, 0] - x0, segments[k, 1] - y0
             bx, by = segments[k, 2] - x0, segments[k, 3] - y0
             first, last = dx * ay - dy * ax, dx * by - dy * bx
-            if (first > 0.0) == (last > 0.0):
+            if (first > 0.0) == (last > 0.0):  # both ends on one side of the way from the reference to the wall
                 continue
             sx, sy = bx - ax, by - ay
+            # where the way meets the segment, along / whole is its share
             along, whole = ax * sy - ay * sx, dx * sy - dy * sx
             if whole < 0.0:
                 along, whole = -along, -whole

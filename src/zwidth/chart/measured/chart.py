@@ -184,7 +184,7 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     cells, closed = _stable_regions(loop)
     if cells is None:
         return _empty_chart(loop)
-    chart = _chart(loop, cells, not closed)
+    chart = _chart_of_cells(loop, cells, not closed)
     if response.sweeps is None:
         return chart
     return replace(chart, stiffness_max_of_sweeps=tuple(_nominal_of_sweeps(response, controller)))
@@ -217,6 +217,7 @@ def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[f
     radius, sweeps = joint_radius(response), response.sweeps
     assert sweeps is not None
     assert radius is not None
+    # of one sweep, relative; a coherence of one average that leaves the same error stands for it
     variance = radius**2 * len(sweeps) / np.log(len(radius) / (1.0 - CONFIDENCE))
     for sweep in sweeps:
         alone = replace(
@@ -303,7 +304,7 @@ def _empty_chart(loop: MeasuredLoop) -> MeasuredChart:
         edge=sample_boundary(loop, coarse_angles(loop)),
         interpolation_error=nan,
         measured_stiffness_max=nan,
-        band=None if loop.errors is None else DoubtBand((), nan, nan, _meaning(loop)),
+        band=None if loop.errors is None else DoubtBand((), nan, nan, _meaning_of_band(loop)),
         stiffness_max_of_sweeps=(),
         unusable=loop.unusable,
         open=False,
@@ -320,10 +321,10 @@ def _no_edge_message(loop: MeasuredLoop) -> str:
     )
 
 
-def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredChart:
+def _chart_of_cells(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredChart:
     """The chart of a loop from its stable cells; opened: the boundary does not close them."""
     peak, zoomed = ((nan, nan), cells) if opened else refine_peak(loop, cells)
-    arcs = tuple(_arcs(loop, cells))
+    arcs = tuple(_boundary_arcs(loop, cells))
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
     angles = angles_at_wall(zoomed, peak)
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
@@ -381,7 +382,7 @@ def _within_error(
         regions=band_rings(loop, cells),
         stiffness_low=certain.stiffness,
         stiffness_high=largest_possible(cells.edge, doubt, nominal, most_damping),
-        meaning=_meaning(loop),
+        meaning=_meaning_of_band(loop),
     )
 
 
@@ -393,7 +394,7 @@ def doubt_along(loop: MeasuredLoop, edge: Boundary, box: Window) -> Doubt | None
     return doubt_of(loop, refine_angles(loop, every, box, DOUBT_CHORD))
 
 
-def _meaning(loop: MeasuredLoop) -> str:
+def _meaning_of_band(loop: MeasuredLoop) -> str:
     """In words: the confidence of the measurement's error band, and what the error is known from."""
     response = loop.response
     sources = ["coherence"] if response.coherence is not None else []
@@ -402,7 +403,7 @@ def _meaning(loop: MeasuredLoop) -> str:
     return f"95 % confidence at all frequencies together, from {' and '.join(sources)}"
 
 
-def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
+def _boundary_arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
     """Runs of measured points on the stable set's edge, then its pieces of the lines of real roots."""
     half = 0.5 / loop.period
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
@@ -417,20 +418,22 @@ def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
         else:
             least, most = _stiffness_in_doubt(loop, theta)
             yield BoundaryArc(K, B, given, stiffness_low=least, stiffness_high=most)
+    # lines K + B w = h of real roots at z = 1 (kind -1) and at z = -1 (kind -2)
     lines = [(-1, 0.0), (-2, half)] if loop.interpolation.closed else [(-1, 0.0)]
     for kind, frequency in lines:
-        static, turned = measured_real_root(loop, kind)
-        if not np.isfinite(static):
+        h, w = measured_real_root(loop, kind)
+        if not np.isfinite(h):
             continue
         for cell in cells.polygons:
-            for low, high in _line_intervals(np.array(cell.exterior.coords), static, turned, scale):
+            for low, high in _line_intervals(np.array(cell.exterior.coords), h, w, scale):
                 ends = np.array([low, high])
-                yield BoundaryArc(static - ends * turned, ends, np.full(2, frequency))
+                yield BoundaryArc(h - ends * w, ends, np.full(2, frequency))
 
 
 def _stiffness_in_doubt(loop: MeasuredLoop, theta: Floats) -> tuple[Floats, Floats]:
     """The least and the largest K (n,) [N/m] that each angle leaves in doubt, at any B; infinite: all."""
     h, w, r = loop.h(theta), loop.w(theta), loop.relative_error(theta)
+    # with an error r over |P| the true K + B w lies in a disk round h / (1 - r^2), see `stable_regions`
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = h / (1.0 - r * r)
         K = middle.real - middle.imag / w.imag * w.real
@@ -440,7 +443,10 @@ def _stiffness_in_doubt(loop: MeasuredLoop, theta: Floats) -> tuple[Floats, Floa
 
 
 def _line_intervals(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[float, float]]:
-    """The pieces of a ring that lie on the line K + B w = h, as intervals of B."""
+    """The pieces of a ring (k, 2) that lie on the line K + B w = h, as intervals of B.
+
+    scale  (2,) size of the window in K and in B
+    """
     on = np.abs(ring[:, 0] + ring[:, 1] * w - h) < 1e-8 * (scale[0] + scale[1] * abs(w))
     pieces = np.flatnonzero(on[:-1] & on[1:])
     for run in np.split(pieces, np.flatnonzero(np.diff(pieces) > 1) + 1) if len(pieces) else []:

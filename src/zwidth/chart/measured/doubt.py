@@ -59,12 +59,10 @@ class Doubt:
         return np.asarray(self.radius >= HARDLY_KNOWN * np.abs(self.response))
 
     def clearance(self, wall_stiffness: float, wall_damping: float) -> tuple[Floats, Floats]:
-        """Distance of a wall from doubt, over |c|, below 0 in doubt, and at which angle: (2 k - 1,) each.
-
-        At the angles, and where on the way from each to the next it is least.
-        """
+        """Distance of a wall from doubt, over |c|, below 0 in doubt, and at which angle: (2 k - 1,) each, in turn
+        at one of the angles and at the place between it and the next where the distance is least."""
         c = wall_stiffness + wall_damping * self.velocity
-        F, reach, share, away = self._way(np.array([[wall_stiffness, wall_damping]]))
+        F, reach, share, away = self._distances_on_way(np.array([[wall_stiffness, wall_damping]]))
         size = np.maximum(np.abs(c), 1e-300)
         near, theta = np.empty((2, 2 * len(self.angles) - 1))
         near[::2], theta[::2] = (np.abs(F) - reach)[0] / size, self.angles
@@ -73,7 +71,7 @@ class Doubt:
         theta[1::2] = self.angles[:-1] + share[0] * np.diff(self.angles)
         return near, theta
 
-    def _way(self, walls: Floats) -> tuple[Complexes, Floats, Floats, Floats]:
+    def _distances_on_way(self, walls: Floats) -> tuple[Complexes, Floats, Floats, Floats]:
         """At walls (n, 2): F = scale + response c (n, k) and how far from 0 it must be; then where on the way
         between two angles, as a share, it is nearest to 0 (n, k - 1), and how near."""
         c = walls[:, :1] + walls[:, 1:] * self.velocity
@@ -97,7 +95,8 @@ class Doubt:
 
     def _stretches(self, walls: Floats) -> tuple[Ints, Ints]:
         """`stretches` of so few walls (n, 2) that they fit in memory at once."""
-        F, reach, _, away = self._way(walls)
+        F, reach, _, away = self._distances_on_way(walls)
+        # in doubt at each angle (odd columns) and between two (even ones); both ends stay false
         flags = np.zeros((len(walls), 2 * len(self.angles) + 1), dtype=bool)
         flags[:, 1::2] = np.abs(F) <= reach
         flags[:, 2:-1:2] = self.joined & (away <= np.maximum(reach[:, :-1], reach[:, 1:]))
@@ -138,12 +137,13 @@ def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
         response = -scale / h
     below = theta < loop.angles[0]
     radius, rest = loop.relative_error(theta), loop.error_below(theta)
+    # angle, scale, response, velocity, radius and rest of `Doubt`
     parts: list[tuple[Any, ...]] = [
-        _real_root(loop, -1),
+        _doubt_at_real_root(loop, -1),
         (theta, scale, response, w, np.where(below, 0.0, radius), np.where(below, rest, 0.0)),
     ]
     if loop.interpolation.closed:
-        parts.append(_real_root(loop, -2))
+        parts.append(_doubt_at_real_root(loop, -2))
     columns = [np.concatenate([np.atleast_1d(part[i]) for part in parts]) for i in range(6)]
     good = np.isfinite(columns[1]) & np.isfinite(columns[2])
     angles, scale, response, w, radius, rest = (column[good] for column in columns)
@@ -152,7 +152,7 @@ def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
     return Doubt(angles, scale.real, response, w, radius.real, rest.real, joined)
 
 
-def _real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float, complex, complex, float, float]:
+def _doubt_at_real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float, complex, complex, float, float]:
     """The doubt about a root at z = 1 (kind -1) or z = -1 (kind -2): angle, scale, response, w, radius, rest."""
     h, w = measured_real_root(loop, kind)
     if kind == -1:
@@ -178,6 +178,7 @@ class MeasuredVerdicts(WallVerdicts):
     outside: Ints
 
     def table(self) -> dict[str, list[Any]]:
+        """The walls as columns, with the number of roots outside."""
         return super().table() | {"roots_outside": self.outside.ravel().tolist()}
 
 

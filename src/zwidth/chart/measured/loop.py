@@ -148,6 +148,7 @@ class MeasuredLoop:
         none = np.empty(0), np.empty(0, dtype=complex)
         if abs(np.angle(P * around_one(self.angles[0]) ** m)) < SETTLED or not self.low_frequencies.fits:
             return none
+        # of stiffness, damping and mass the one that rules a response with m integrators
         if self.low_frequencies.terms[m] <= 0.0:
             return none
         shares = 0.5 ** np.arange(HALVINGS, 0, -1)
@@ -188,9 +189,10 @@ class MeasuredLoop:
 
     def w(self, theta: Floats) -> Complexes:
         """Response w (...) [1/s] of the velocity estimate to the position, at angles theta in (0, pi]."""
-        d, own = around_one(theta), velocity_estimator(self.controller)
+        d, estimator = around_one(theta), velocity_estimator(self.controller)
         return np.asarray(
-            factor_response(own.numerator, own.denominator, d) * window_response(own.window, 1.0 + d)
+            factor_response(estimator.numerator, estimator.denominator, d)
+            * window_response(estimator.window, 1.0 + d)
         )
 
     def walls(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
@@ -242,10 +244,11 @@ class MeasuredLoop:
         angles, radius = self.error_nodes
         used = np.isin(angles, self.angles)
         with np.errstate(divide="ignore"):
+            # |P (z - 1)^m| at the nodes, and its inverse at theta
             size = 1.0 / np.abs(self.interpolation.inverse(angles) * around_one(angles) ** -self.integrators)
-            own = np.abs(self.interpolation.inverse(theta) * around_one(theta) ** -self.integrators)
+            inverse = np.abs(self.interpolation.inverse(theta) * around_one(theta) ** -self.integrators)
         relative = np.interp(theta, angles, radius)
-        absolute = np.interp(theta, angles, radius * size) * own
+        absolute = np.interp(theta, angles, radius * size) * inverse
         after = np.clip(np.searchsorted(angles, theta), 1, len(angles) - 1)
         return np.asarray(np.where(used[after] & used[after - 1], relative, absolute))
 
@@ -266,7 +269,7 @@ class MeasuredLoop:
             return np.zeros(np.shape(theta))
         angles, theta = self.error_nodes[0], np.asarray(theta)
         error = self._node_error(theta) + BETWEEN * self.interpolation.relative_error(theta)
-        past = np.maximum(theta - angles[-1], 0.0)
+        past = np.maximum(theta - angles[-1], 0.0)  # how far beyond the last frequency
         if np.pi - angles[-1] > 1e-9 and np.any(past > 0.0):
             P = 1.0 / self.interpolation.inverse(np.array([max(2.0 * angles[-1] - np.pi, angles[0]), angles[-1]]))
             changed = np.abs(np.log(np.abs(P[1] / P[0]))) + np.abs(np.angle(P[1] / P[0]))
@@ -287,6 +290,7 @@ class MeasuredLoop:
             largest = np.max(np.abs(self.h(lowest)) * (1.0 + self.error_nodes[1][0]))
             return np.broadcast_to(largest, theta.shape)
         f = theta / (2.0 * np.pi * self.period)
+        # of one deviation, for all angles together with the probability CONFIDENCE
         often = np.sqrt(2.0 * np.log(len(self.angles) / (1.0 - CONFIDENCE)))
         fitted = np.abs(self.low_frequencies.inverse(f, 0) - self.low_frequencies.inverse(f, self.integrators))
         floor = (self.error_nodes[1][0] + self.interpolation.relative_error(theta)) * np.abs(
@@ -341,7 +345,9 @@ def unusable_ranges(
             f"below the data, whose phase is {np.degrees(phase):.0f} degrees from that of {m} integrators at "
             f"{f[0]:.6g} Hz; the response is continued to 0: measure lower",
         )
-    yield from sorted([*_incoherent(response, good), *_gaps(f, errors[1:])], key=lambda s: s.low)
+    yield from sorted(
+        [*_incoherent_stretches(response, good), *_unmeasured_stretches(f, errors[1:])], key=lambda s: s.low
+    )
     goes_on, measured = reaches_half_rate(theta)
     if not measured:
         consequence = (
@@ -352,9 +358,9 @@ def unusable_ranges(
         yield UnusableRange(float(f[-1]), half, f"beyond the data, which end at {f[-1]:.6g} Hz; {consequence}")
 
 
-def _incoherent(response: Response, good: Flags) -> Iterator[UnusableRange]:
+def _incoherent_stretches(response: Response, good: Flags) -> Iterator[UnusableRange]:
     """Stretches of frequencies that are not `good` (n,), each from the good one before to that after it."""
-    for run in _runs(~good, SAME_STRETCH):
+    for run in _groups_of_true(~good, SAME_STRETCH):
         low = response.frequency[run[0] - 1] if run[0] > 0 else 0.0
         high = response.frequency[min(run[-1] + 1, len(good) - 1)]
         if response.coherence is None:
@@ -370,26 +376,27 @@ def _incoherent(response: Response, good: Flags) -> Iterator[UnusableRange]:
             yield UnusableRange(float(low), float(high), reason)
 
 
-def _gaps(f: Floats, errors: Floats) -> Iterator[UnusableRange]:
-    """Stretches of f (n,) [Hz] not measured, or where P cannot be interpolated by errors (n - 1,) between them."""
+def _unmeasured_stretches(f: Floats, errors: Floats) -> Iterator[UnusableRange]:
+    """Stretches of f (n,) [Hz] where nothing was measured, or where interpolation between neighbours leaves too
+    large a relative error of P: errors (n - 1,)."""
     spacing = np.diff(f)
     around = np.array([np.median(spacing[max(0, i - 5) : i + 6]) for i in range(len(spacing))])
     empty = (spacing > WIDEST_GAP * around) & (f[1:] > WIDEST_RATIO * f[:-1])
     coarse = (errors > COARSEST) & ~empty
-    for run in _runs(coarse, SAME_STRETCH):
+    for run in _groups_of_true(coarse, SAME_STRETCH):
         yield UnusableRange(
             float(f[run[0]]),
             float(f[run[-1] + 1]),
             "the response changes so fast from one frequency to the next that what lies between is uncertain by "
             f"up to {100.0 * float(np.max(errors[run])):.2g} %; measure closer",
         )
-    for run in _runs(empty):
+    for run in _groups_of_true(empty):
         yield UnusableRange(
             float(f[run[0]]), float(f[run[-1] + 1]), "nothing measured; the response is interpolated"
         )
 
 
-def _runs(flags: Flags, reach: int = 1) -> list[Ints]:
+def _groups_of_true(flags: Flags, reach: int = 1) -> list[Ints]:
     """Indices of the true flags in groups, within which neighbours are no farther apart than `reach`."""
     at = np.flatnonzero(flags)
     return np.split(at, np.flatnonzero(np.diff(at) > reach) + 1) if len(at) else []

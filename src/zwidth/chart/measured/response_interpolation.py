@@ -24,7 +24,8 @@ FEWEST = 6  # frequencies; fewer make no curve
 class ResponseInterpolation:
     """Cubic pieces of G, 1/G and log G over ascending nodes theta, and which of them each interval uses.
 
-    values, slopes  (3, n) at the nodes;   kind (n - 1,) 0, 1 or 2
+    values, slopes  (3, n) of G, 1/G and log G at the nodes, and by theta
+    kind            (n - 1,) which of the three is interpolated there: 0, 1 or 2
     straight        (n - 1,) where G is taken straight from node to node instead
     error           (n - 1,) relative error of P to be expected there: a 64th of what the cubic through four
                     neighbours misses a node by, which is the fourth derivative's part in both on even spacing
@@ -41,17 +42,17 @@ class ResponseInterpolation:
     delay: int
     closed: bool
 
-    def _at(self, theta: Floats) -> Ints:
+    def _interval_of(self, theta: Floats) -> Ints:
         """Index (...) of the interval between nodes that holds each angle."""
         return np.clip(np.searchsorted(self.nodes, theta, side="right") - 1, 0, len(self.nodes) - 2)
 
     def inverse(self, theta: Floats) -> Complexes:
         """Interpolated 1 / P (...) [N/m] at angles theta (...) in (0, pi]."""
-        i = self._at(theta)
+        i = self._interval_of(theta)
         kind = self.kind[i]
         step = self.nodes[i + 1] - self.nodes[i]
         t = (theta - self.nodes[i]) / step
-        u = 1.0 - t
+        u = 1.0 - t  # Hermite's cubic from the node before (t = 0) to that after (u = 0)
         value = u * u * ((1.0 + 2.0 * t) * self.values[kind, i] + t * step * self.slopes[kind, i])
         value += t * t * ((1.0 + 2.0 * u) * self.values[kind, i + 1] - u * step * self.slopes[kind, i + 1])
         value = np.where(self.straight[i], u * self.values[0, i] + t * self.values[0, i + 1], value)
@@ -62,7 +63,7 @@ class ResponseInterpolation:
 
     def relative_error(self, theta: Floats) -> Floats:
         """Relative error of P (...) that interpolation is expected to leave."""
-        return np.asarray(self.error[self._at(theta)])
+        return np.asarray(self.error[self._interval_of(theta)])
 
 
 def around_one(theta: Floats) -> Complexes:
@@ -123,7 +124,7 @@ def _with_mirror_images(theta: Floats, G: Complexes, closed: bool) -> tuple[Floa
     nodes, values = [-theta[MIRRORED - 1 :: -1], theta], [np.conj(G[MIRRORED - 1 :: -1]), G]
     if closed:
         at_end = np.pi - theta[-1] < 1e-9
-        if at_end:
+        if at_end:  # G is real at pi
             values[1] = np.append(G[:-1], G[-1].real or 1e-15 * abs(G[-2]))
         near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
         nodes.append(2.0 * np.pi - theta[near])
@@ -165,7 +166,8 @@ def _slopes(x: Floats, y: Complexes) -> Complexes:
 
 
 def _prediction_error(x: Floats, y: Complexes, size: Floats | Complexes | float) -> Floats:
-    """How far the cubic through its four neighbours misses each node, relative to `size`."""
+    """How far the cubic through its four neighbours misses each node x, y (n,), relative to `size` (n,) or a
+    number."""
     window, here = _windows(len(x))
     scale, _ = _products(x, window, here)
     # Lagrange's basis on the four others, at the node: the fourth difference over the node's own weight
@@ -177,7 +179,8 @@ def _prediction_error(x: Floats, y: Complexes, size: Floats | Complexes | float)
 
 
 def _products(x: Floats, window: Ints, here: Flags) -> tuple[Floats, Floats]:
-    """For every window: the product of each node's distances to the others, and its distance from the middle."""
+    """For the windows of `_windows`, (n, 5) each: the product of each node's distances to the other four, and its
+    distance from the node that the window is of, 1 for that itself."""
     at = x[window]
     apart = at[:, :, None] - at[:, None, :]
     apart[:, np.arange(5), np.arange(5)] = 1.0

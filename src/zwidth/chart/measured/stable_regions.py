@@ -112,6 +112,7 @@ def regions_within(loop: MeasuredLoop, known: Boundary, box: Window) -> StableRe
 def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry]:
     """The segments in the window, in its units (wall - low) / scale; ends of the curve drawn a tick across."""
     ends = (edge.segments.reshape(-1, 2, 2) - low) / scale
+    # the curve's first segment begins on the line of z = 1 (kind -1), its last ends on that of z = -1 (kind -2)
     for first, kind in ((0, -1), (np.flatnonzero(edge.angle_index >= 0)[-1], -2)):
         if np.any(edge.angle_index == kind):
             a, b = ends[first]
@@ -181,7 +182,7 @@ def refine_peak(loop: MeasuredLoop, cells: StableRegions) -> tuple[tuple[float, 
     for _ in range(2):
         if isnan(peak[0]):
             break
-        near = _around(peak, nearby.box, 1e-3, 2e-2)
+        near = _window_around(peak, nearby.box, 1e-3, 2e-2)
         closer = regions_within(loop, cells.edge, near)
         better = _stiffest(closer)
         if isnan(better[0]) or better[0] > near[1] - 1e-6 * (near[1] - near[0]):
@@ -199,7 +200,7 @@ def _stiffest(cells: StableRegions) -> tuple[float, float]:
     return (peak.stiffness, peak.damping) if peak else (nan, nan)
 
 
-def _around(wall: tuple[float, float], box: Window, of_K: float, of_B: float) -> Window:
+def _window_around(wall: tuple[float, float], box: Window, of_K: float, of_B: float) -> Window:
     """The window about a wall (K, B) that extends shares of_K and of_B of a box to either side of it."""
     K, B = wall
     half_K, half_B = of_K * (box[1] - box[0]), of_B * (box[3] - box[2])
@@ -212,11 +213,13 @@ def angles_at_wall(cells: StableRegions, wall: tuple[float, float]) -> list[floa
         return []
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
+    # distance of the wall from each segment, in shares of the window, and the share of the segment nearest to it
     ends = (cells.edge.segments.reshape(-1, 2, 2) - np.array(wall)) / scale
     a, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
     share = np.clip(-np.einsum("ij,ij->i", a, along) / length, 0.0, 1.0)
     away = np.hypot(*(a + share[:, None] * along).T)
+    # angle_index: of the curve from 0 on; -1 and -2 on the lines of z = 1 and z = -1; -3 beyond the data
     angles: list[float] = []
     near = np.flatnonzero(away < 1e-4)
     for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else []:
@@ -239,7 +242,7 @@ def largest_damping(loop: MeasuredLoop, cells: StableRegions) -> float:
         if top <= 0.0:
             break
         largest = top
-        nearby = regions_within(loop, cells.edge, _around((0.0, largest), cells.box, 1e-3, 1e-3))
+        nearby = regions_within(loop, cells.edge, _window_around((0.0, largest), cells.box, 1e-3, 1e-3))
     return largest
 
 
@@ -303,14 +306,14 @@ def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: In
     for run in np.split(curve, np.flatnonzero(np.diff(curve) > 1) + 1) if len(curve) else []:
         at = edge.angle_index[run]
         at = np.unique(np.concatenate([at[::every], at[-1:], at[-1:] + 1]))
-        outlines = _outlines(loop, edge.angles[at], edge.walls[at]) / scale
+        outlines = _ellipse_outlines(loop, edge.angles[at], edge.walls[at]) / scale
         points = np.concatenate([outlines[:-1], outlines[1:]], axis=1)
         number = np.repeat(np.arange(len(points)), 2 * CORNERS)
         hulls.extend(shapely.convex_hull(shapely.multipoints(points.reshape(-1, 2), indices=number)))
     return shapely.union_all(hulls)
 
 
-def _outlines(loop: MeasuredLoop, theta: Floats, walls: Floats) -> Floats:
+def _ellipse_outlines(loop: MeasuredLoop, theta: Floats, walls: Floats) -> Floats:
     """Points (n, CORNERS, 2) round the ellipses of doubt at walls (n, 2) of the curve.
 
     |c - h| <= r |c| is a disk round h / (1 - r^2) of radius r |h| / (1 - r^2). Where the error is as large as the
@@ -357,13 +360,16 @@ def certain_wall(edge: Boundary, doubt: Doubt, lines: Floats) -> CertainWall:
     edge   the boundary, close enough to the curve where walls are stable
     lines  dampings (n,) at which to look first, ascending [N s/m]
     """
-    values = _certain(edge, doubt, lines)
+    values = _certain_stiffnesses(edge, doubt, lines)
     for _ in range(ZOOMS):
         if np.all(np.isnan(values)):
             return CertainWall()
         best = int(np.nanargmax(values))
         more = np.linspace(lines[max(best - 1, 0)], lines[min(best + 1, len(lines) - 1)], ZOOMED_LINES)
-        lines, values = np.append(more, lines[best]), np.append(_certain(edge, doubt, more), values[best])
+        lines, values = (
+            np.append(more, lines[best]),
+            np.append(_certain_stiffnesses(edge, doubt, more), values[best]),
+        )
         order = np.argsort(lines)
         lines, values = lines[order], values[order]
     best = int(np.nanargmax(values))
@@ -405,9 +411,9 @@ def _may_be_stable(edge: Boundary, doubt: Doubt, walls: Floats) -> Flags:
     return np.asarray(edge.outside(walls) <= 2 * doubt.stretches(walls)[1])
 
 
-def _certain(edge: Boundary, doubt: Doubt, dampings: Floats) -> Floats:
+def _certain_stiffnesses(edge: Boundary, doubt: Doubt, dampings: Floats) -> Floats:
     """The largest stiffness (n,) that is stable for certain on lines of these dampings (n,); nan: none."""
-    gaps = [_gaps(_intervals(edge, doubt, B)) for B in dampings.tolist()]
+    gaps = [_gaps(_doubtful_intervals(edge, doubt, B)) for B in dampings.tolist()]
     number = np.repeat(np.arange(len(gaps)), [len(gap) for gap in gaps])
     every = np.vstack(gaps)
     stable = edge.outside(np.column_stack([_middles(every), dampings[number]])) == 0
@@ -417,8 +423,11 @@ def _certain(edge: Boundary, doubt: Doubt, dampings: Floats) -> Floats:
     return np.where(np.isfinite(result), result, nan)
 
 
-def _intervals(edge: Boundary, doubt: Doubt, B: float) -> Floats:
-    """Intervals of K (n, 2) [N/m] that are in doubt on the line of damping B [N s/m]; ends may be infinite."""
+def _doubtful_intervals(edge: Boundary, doubt: Doubt, B: float) -> Floats:
+    """Intervals of K (n, 2) [N/m] that are in doubt on the line of damping B [N s/m]; ends may be infinite.
+
+    Symbols are those of the file's head.
+    """
     p, s, w, R2 = doubt.response, doubt.scale, doubt.velocity, doubt.radius**2
     base = s + p * (B * w)
     a = np.abs(p) ** 2 - R2
@@ -436,18 +445,18 @@ def _intervals(edge: Boundary, doubt: Doubt, B: float) -> Floats:
             inner,
             np.column_stack([above, np.full(len(above), inf)]),
             np.column_stack([np.full(len(below), -inf), below]),
-            _crossings(edge, doubt, B),
+            _intervals_at_crossings(edge, doubt, B),
         ]
     )
 
 
-def _crossings(edge: Boundary, doubt: Doubt, B: float) -> Floats:
+def _intervals_at_crossings(edge: Boundary, doubt: Doubt, B: float) -> Floats:
     """Intervals of K in doubt (n, 2) round each crossing of the boundary with the line of damping B."""
     a, b = edge.segments[:, :2], edge.segments[:, 2:]
     at = np.flatnonzero((a[:, 1] > B) != (b[:, 1] > B))
     share = (B - a[at, 1]) / (b[at, 1] - a[at, 1])
     K = a[at, 0] + share * (b[at, 0] - a[at, 0])
-    number = edge.angle_index[at]
+    number = edge.angle_index[at]  # of the curve from 0 on; -1 on the line of z = 1, -2 on that of z = -1
     theta = np.where(number >= 0, edge.angles[np.maximum(number, 0)], np.where(number == -1, 0.0, np.pi))
     near = np.clip(np.searchsorted(doubt.angles, theta), 0, len(doubt.angles) - 1)
     size = np.abs(K + B * doubt.velocity[near])

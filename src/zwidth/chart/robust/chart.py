@@ -44,6 +44,7 @@ class RobustChart(CommonChart):
 
     @property
     def charted(self) -> Mapping[int, Loop]:
+        """Index -> loop, of those that could be charted."""
         return self.members
 
     @property

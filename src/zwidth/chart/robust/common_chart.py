@@ -30,7 +30,7 @@ class CommonChart(DrawnChart):
     best_by_area, best_by_stiffness  members with the largest stable_area, and stiffness_max, if charted alone
     lost_share      1 - stable_area / that of the best by area
     lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
-    excluding       members that leave no wall in common (see `common_set.incompatible_members`); () where there is
+    excluding       members that leave no wall in common (see `members.incompatible_members`); () where there is
                     one
     outlines        index -> the member's own closed walks (k, 2) of [stiffness, damping]
     off_circle      (k, 2) [K, B] of walls of the edge that are not on the stability limit: for the member that
@@ -128,5 +128,6 @@ class CommonChart(DrawnChart):
 
 
 def lost_share(left: float, whole: float) -> float:
-    """Share lost; nan where there was nothing to lose. Rounding can make a share negative that is 0."""
+    """Share of `whole` lost where `left` remains; nan where there was nothing to lose. Rounding can make a share
+    negative that is 0."""
     return max(1.0 - left / whole, 0.0) if whole > 0.0 else float("nan")

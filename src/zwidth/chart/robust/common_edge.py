@@ -49,7 +49,8 @@ def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: fl
     """The edge of a common set as pieces of the members' arcs, and the share of its size to which corners are
     known: rounding, but more where two arcs all but coincide.
 
-    shape    [K unit, B], see `common_set.intersect_members`
+    shape    [K unit, B], see `members.intersect_members`
+    unit     seconds: K unit and B have one unit, in which distances between walls are taken
     members  those that cut it out; where several have the same edge, the first of them gets it
     """
     if shape.is_empty:
@@ -62,7 +63,7 @@ def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: fl
         cell = cell.normalize()  # exterior clockwise, holes counter-clockwise
         for line in (cell.exterior, *cell.interiors):
             points = shapely.get_coordinates(line)[::-1]
-            runs = _runs(points, members, segments, SAME * size)
+            runs = _runs_on_arcs(points, members, segments, SAME * size)
             runs = _merge_runs([run for run in runs if len(runs) < 3 or run.length > SHORTEST * size])
             runs = _merge_runs(_runs_on_edge(runs, members, unit, INSIDE * size))
             ring, blurred = _arcs_between_corners(runs, unit, size)
@@ -83,8 +84,13 @@ def _outline_chords(members: Sequence[Member], unit: float) -> _OutlineChords:
     return _OutlineChords(np.concatenate(ends), np.concatenate(angles), np.concatenate(origin))
 
 
-def _runs(points: Floats, members: Sequence[Member], segments: _OutlineChords, near: float) -> list[ArcRun]:
-    """The walk round a polygon (k, 2) [K unit, B] in runs, each on one arc; the first begins an arc."""
+def _runs_on_arcs(
+    points: Floats, members: Sequence[Member], segments: _OutlineChords, near: float
+) -> list[ArcRun]:
+    """The walk round a polygon (k, 2) [K unit, B] in runs, each on one arc; the first begins an arc.
+
+    segments, near  as for `_nearest_segments`
+    """
     nearest = _nearest_segments(points, segments, near)
     origins = segments.origin[nearest]
     angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(nearest)])
@@ -111,7 +117,10 @@ def _starts_anew(arc: Arc, before: float, after: float) -> bool:
 
 def _nearest_segments(points: Floats, segments: _OutlineChords, near: float) -> Ints:
     """For each edge of a walk the segment that it lies on: the first within `near` of both its ends that runs the
-    same way, and of several the one on the arc of the edge before."""
+    same way, and of several the one on the arc of the edge before.
+
+    points  (k, 2) of the walk [K unit, B];   Returns  (k - 1,) numbers of segments
+    """
     middles = 0.5 * (points[:-1] + points[1:])
     inside = np.flatnonzero(
         np.all(segments.ends.max(axis=1) >= points.min(axis=0) - near, axis=1)
@@ -159,7 +168,10 @@ def _angle(segments: _OutlineChords, k: int, point: Floats) -> float:
 
 
 def _runs_on_edge(runs: list[ArcRun], members: Sequence[Member], unit: float, depth: float) -> list[ArcRun]:
-    """Runs without those whose middle is unstable for another member; all of them if none would be left."""
+    """Runs without those whose middle is unstable for another member; all of them if none would be left.
+
+    depth  how far inside the run its middle is tested [K unit, B]
+    """
     on_edge = []
     for run in runs:
         K, B = (run.middle(unit) + depth * run.inwards(unit)) / (unit, 1.0)
@@ -251,7 +263,7 @@ class ArcRun:
         first, last = np.array([self.arc.first, self.arc.last]) * (unit, 1.0)
         return float((point - first) @ (last - first) / ((last - first) @ (last - first)))
 
-    def _middle(self, unit: float) -> tuple[float, float]:
+    def _middle_parameter(self, unit: float) -> tuple[float, float]:
         """Parameter half way along the run, and the sign with which it changes along it."""
         start = self.parameter(self.angles[0], self.first, unit)
         end = self.parameter(self.angles[1], self.last, unit)
@@ -259,11 +271,11 @@ class ArcRun:
 
     def middle(self, unit: float) -> Floats:
         """The wall half way along the run, by its parameter [K unit, B]."""
-        return self.at(self._middle(unit)[0], unit)[0]
+        return self.at(self._middle_parameter(unit)[0], unit)[0]
 
     def inwards(self, unit: float) -> Floats:
         """Unit vector (2,) at `middle` towards the common set, which is on the left of the run."""
-        u, sign = self._middle(unit)
+        u, sign = self._middle_parameter(unit)
         along = sign * self.at(u, unit)[1]
         return np.asarray(np.array([-along[1], along[0]]) / max(np.hypot(*along), 1e-300))
 
@@ -293,7 +305,11 @@ def solve_corner(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner:
 
 
 def _solve_crossing(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner | None:
-    """Newton for the crossing of two arcs, from where the polygons have it; None if it wanders off."""
+    """Newton for the crossing of two arcs, from where the polygons have it; None if it wanders off.
+
+    size  of the set [K unit, B]
+    """
+    # parameters u and v, walls p and q there
     u, v = one.parameter(one.angles[1], one.last, unit), two.parameter(two.angles[0], two.first, unit)
     best, least = (u, v), np.inf
     for _ in range(40):

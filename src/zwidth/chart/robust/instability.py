@@ -40,7 +40,7 @@ def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Flags:
 
 @compiled_lean
 def mark_unstable(polynomials: Floats, N: int, K: Floats, B: Floats, room: Floats, out: Flags) -> None:
-    """Mark the walls (k,) that are certainly unstable for a loop of degree N."""
+    """Set `out` (k,) to whether each wall is certainly unstable for a loop of degree N."""
     for i in range(len(K)):
         out[i] = all_roots_inside(polynomials, N, K[i], B[i], room) < 0
 
@@ -124,7 +124,7 @@ def softening(polynomials: Floats, K: float, B: float) -> float:
 @compiled_lean
 def _softening(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> float:
     """`softening` for polynomials of degree N."""
-    bad, step = 0.0, 1e-8
+    bad, step = 0.0, 1e-8  # shares of K by which it is softened: too little, good (enough), and their distance
     while True:
         good = min(bad + step, 1.0)
         if good >= 1.0:

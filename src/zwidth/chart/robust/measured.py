@@ -43,6 +43,7 @@ class MeasuredRobustChart(CommonChart):
 
     @property
     def charted(self) -> Mapping[int, MeasuredChart]:
+        """Index -> measured chart, of those whose edge closes."""
         return self.members
 
     @property
@@ -78,15 +79,15 @@ def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[
     shapes = {index: certain_walls(chart, unit) for index, chart in members.items()}
     common = shapely.MultiPolygon(polygonal(shapely.intersection_all(list(shapes.values()))))
     quadrants = {index: _quadrant(shape) for index, shape in shapes.items()}
-    left = _quadrant(common)
+    common_quadrant = _quadrant(common)
     alone = {index: _stiffest(quadrant, unit) for index, quadrant in quadrants.items()}
-    peak = K, B, _ = _stiffest_common(members, alone, left, unit)
-    arcs = tuple(_arcs(members, shapes, common, unit))
+    peak = K, B, _ = _stiffest_common(members, alone, common_quadrant, unit)
+    arcs = tuple(_arcs_of_members(members, shapes, common, unit))
     at_peak, frequencies = _members_at_peak(members, shapes, common, peak, unit)
     areas = {index: float(quadrant.area) / unit for index, quadrant in quadrants.items()}
     by_area = max(areas, key=lambda index: (areas[index], -index))
     by_stiffness = max(alone, key=lambda index: (np.nan_to_num(alone[index][0]), -index))
-    area = float(left.area) / unit
+    area = float(common_quadrant.area) / unit
     without = [index for index, quadrant in quadrants.items() if quadrant.is_empty]
     return MeasuredRobustChart(
         drawn_regions=_rings(common, unit),
@@ -94,7 +95,7 @@ def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[
         stiffness_max=K,
         damping_at_stiffness_max=B,
         frequencies_at_stiffness_max=frequencies,
-        damping_max=_largest_damping(left),
+        damping_max=_largest_damping(common_quadrant),
         stable_area=area,
         members=dict(members),
         failed=dict(failed),
@@ -151,6 +152,7 @@ def certain_walls(chart: MeasuredChart, unit: float) -> shapely.MultiPolygon:
 
 
 def _union(rings: tuple[Floats, ...], unit: float) -> shapely.Geometry:
+    """The area that rings (k, 2) of [K, B] cover, in [K unit, B]."""
     return shapely.union_all([shapely.make_valid(shapely.Polygon(ring * (unit, 1.0))) for ring in rings])
 
 
@@ -180,19 +182,19 @@ def _stiffest(quadrant: shapely.MultiPolygon, unit: float) -> tuple[float, float
 def _stiffest_common(
     members: Mapping[int, MeasuredChart],
     alone: Mapping[int, tuple[float, float]],
-    left: shapely.MultiPolygon,
+    common_quadrant: shapely.MultiPolygon,
     unit: float,
 ) -> tuple[float, float, int | None]:
     """K, B of the stiffest wall that every member finds stable, nan where there is none, and whose own stiffest
     wall it is; None: nobody's.
 
-    alone  index -> the stiffest corner of the member's own polygons
-    left   what all have in common with K >= 0, B >= 0
+    alone            index -> K, B of the stiffest corner of the member's own polygons
+    common_quadrant  the walls with K >= 0, B >= 0 that all have in common, in [K unit, B]
 
     The member of least stiffness has its stiffest wall from its own chart, which is sharper than polygons: if all
     others find that wall stable it is the answer. Otherwise it is the stiffest corner of what is in common.
     """
-    K, B = _stiffest(left, unit)
+    K, B = _stiffest(common_quadrant, unit)
     if not K > 0.0:
         return nan, nan, None
     least = min(alone, key=lambda index: (alone[index][0], index))
@@ -210,13 +212,13 @@ def _stiffest_common(
     return nan, nan, None
 
 
-def _largest_damping(left: shapely.MultiPolygon) -> float:
-    """Largest damping [N s/m] at small K > 0 of `left`, the common set in K, B >= 0; 0 without one."""
-    if left.is_empty:
+def _largest_damping(common_quadrant: shapely.MultiPolygon) -> float:
+    """Largest damping [N s/m] at small K > 0 of the common set's part with K, B >= 0; 0 where that is empty."""
+    if common_quadrant.is_empty:
         return 0.0
-    right, top = left.bounds[2:]
+    right, top = common_quadrant.bounds[2:]
     line = shapely.LineString([(LOW * right, 0.0), (LOW * right, top)])
-    crossed = shapely.get_coordinates(shapely.intersection(left, line))
+    crossed = shapely.get_coordinates(shapely.intersection(common_quadrant, line))
     return float(np.max(crossed[:, 1], initial=0.0))
 
 
@@ -242,7 +244,7 @@ def _members_at(
     return tuple(sorted(list(shapes)[k] for k in order))
 
 
-def _arcs(
+def _arcs_of_members(
     members: Mapping[int, MeasuredChart],
     shapes: Mapping[int, shapely.MultiPolygon],
     common: shapely.MultiPolygon,

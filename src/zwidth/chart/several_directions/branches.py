@@ -56,6 +56,7 @@ class BranchSamples:
             slopes = np.full_like(walls, np.nan)
             n, q = np.nonzero(np.isfinite(walls[..., 0]))
             _, J = equation.linear(np.column_stack([parameters[n], walls[n, q]]))
+            # how both walls must move for what vanishes to stay 0 while the parameter goes on, by Cramer's rule
             volume = J[:, 0, 1] * J[:, 1, 2] - J[:, 0, 2] * J[:, 1, 1]
             slopes[n, q, 0] = (J[:, 0, 2] * J[:, 1, 0] - J[:, 1, 2] * J[:, 0, 0]) / volume
             slopes[n, q, 1] = (J[:, 1, 1] * J[:, 0, 0] - J[:, 0, 1] * J[:, 1, 0]) / volume
@@ -94,7 +95,7 @@ class _Fold(NamedTuple):
 def trace_branches(
     equation: RootEquation, samples: BranchSamples, box: WallBox
 ) -> tuple[BranchSamples, list[CurvePoints]]:
-    """The branches within a box, and the samples that it took. A closed branch ends in the point it begins in."""
+    """The samples that this took, and the branches within a box. A closed branch ends where it begins."""
     for _ in range(ROUNDS):
         forward, folds, unclear = _link(equation, samples, box)
         u = samples.parameters
@@ -103,13 +104,13 @@ def trace_branches(
         if not len(middles) or len(u) > MOST:
             break
         samples = samples.with_more(equation, middles)
-    return samples, _walks(samples, forward, folds)
+    return samples, _joined_branches(samples, forward, folds)
 
 
 @np.errstate(all="ignore")
 def _link(equation: RootEquation, samples: BranchSamples, box: WallBox) -> tuple[Ints, list[_Fold], Flags]:
-    """Number (N - 1, q) of the wall at the next parameter in which each continues, -1 for none; folds; and the
-    intervals (N - 1,) in which links are missing."""
+    """Number (N - 1, q) of the wall at the next parameter in which each continues, -1 for none; folds; and
+    which intervals (N - 1,) miss links."""
     forward = _continuations(samples, box)
     near = box.with_margin(AROUND).holds(samples.walls)
     ahead, behind = near.copy(), near.copy()
@@ -128,11 +129,13 @@ def _continuations(samples: BranchSamples, box: WallBox) -> Ints:
     x, slopes = samples.walls / box.size, samples.slopes / box.size
     step = np.diff(samples.parameters)[:, None, None, None]
     chord = x[1:, None, :] - x[:-1, :, None]
+    # (N - 1, q, q) how far each next wall is from where the mean of its slope and this wall's leads to
     miss = np.abs(chord - 0.5 * step * (slopes[1:, None, :] + slopes[:-1, :, None])).max(axis=-1)
     miss = np.where(np.isfinite(miss), miss, np.inf)
     best = miss.argmin(axis=2)[..., None]
     own = np.take_along_axis(miss, best, axis=2)
     length = np.take_along_axis(np.abs(chord).max(axis=-1), best, axis=2)
+    # the next best for this wall, and the best of others for the wall that it leads to
     rivals = miss.copy()
     np.put_along_axis(rivals, best, np.inf, axis=2)
     q = x.shape[1]
@@ -156,6 +159,7 @@ def _folds(equation: RootEquation, samples: BranchSamples, box: WallBox, open_: 
     way    1 ahead, -1 behind
     """
     u, x = samples.parameters, samples.walls
+    # walls a and b at parameter n, whose slopes point towards each other that way
     both = np.triu(open_[:, :, None] & open_[:, None, :], 1)
     n, a, b = np.nonzero(both)
     chord = (x[n, b] - x[n, a]) / box.size
@@ -190,7 +194,7 @@ def _cosine(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.einsum("ni,ni->n", one, other) / length)
 
 
-def _walks(samples: BranchSamples, forward: Ints, folds: list[_Fold]) -> list[CurvePoints]:
+def _joined_branches(samples: BranchSamples, forward: Ints, folds: list[_Fold]) -> list[CurvePoints]:
     """Walls linked by `forward` (as of `_link`) and folds, joined to branches; one branch after the other."""
     q = samples.walls.shape[1]
     joints: list[_Fold | None] = []

@@ -66,7 +66,7 @@ class _Cells:
     raster: Raster
 
 
-def _law(loop: MultiLoop) -> dict[str, Any]:
+def _document_of_law(loop: MultiLoop) -> dict[str, Any]:
     """The law's matrices as lists by key; none where the law is the same along all directions."""
     own = loop.matrices
     if own is None:
@@ -75,6 +75,7 @@ def _law(loop: MultiLoop) -> dict[str, Any]:
 
 
 def _undecided(doubt: str) -> str:
+    """What a document says of a doubt; "" where there is none."""
     return f"this is undecided: {doubt}" if doubt else ""
 
 
@@ -96,7 +97,7 @@ class MultiChart(DrawnChart):
     complete    whether it is shown that no cell is missing
     """
 
-    loop: MultiLoop = field(metadata=entry(value=_law, spread=True))
+    loop: MultiLoop = field(metadata=entry(value=_document_of_law, spread=True))
     judged: int = field(metadata=entry(name="walls_judged"))
     doubtful: Floats = field(metadata=entry(name="walls_in_doubt", lists=True))
     off_circle: Floats = field(metadata=entry(name="edge_walls_in_doubt", lists=True))
@@ -124,6 +125,7 @@ class MultiChart(DrawnChart):
         return "exact" if self.complete and not len(self.missed) else "at least"
 
     def _summary(self) -> str:
+        """What the chart is of, in a few words; that it is in doubt first."""
         return f"in doubt, {super()._summary()} found" if self.doubt else super()._summary()
 
     def _numbers(self) -> list[str]:
@@ -200,13 +202,13 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     """
     check_kind("loop", loop, MultiLoop, "stability_chart takes a Loop" if isinstance(loop, Loop) else "")
     cells = _stable_cells(loop, trace_curves(loop))
-    edge = _edge(loop, cells.inside, cells.polygons)
+    edge = _edge_of_polygons(loop, cells.inside, cells.polygons)
     off = _walls_off_circle(loop, edge)
     for _ in range(MOST_AGAIN):
         if not len(off):
             break
         cells = _stable_cells(loop, cells.curves.with_angles(_angles_beside(loop, off)))
-        edge = _edge(loop, cells.inside, cells.polygons)
+        edge = _edge_of_polygons(loop, cells.inside, cells.polygons)
         off = _walls_off_circle(loop, edge)
     curves, raster = cells.curves, cells.raster
     complete, missed = shows_all_walls(curves.equations), np.empty((0, 2))
@@ -281,7 +283,7 @@ def _fitting_box(polygons: list[shapely.Polygon], box: WallBox) -> WallBox:
     )
 
 
-def _edge(loop: MultiLoop, curves: list[WallCurve], polygons: list[shapely.Polygon]) -> TracedEdge:
+def _edge_of_polygons(loop: MultiLoop, curves: list[WallCurve], polygons: list[shapely.Polygon]) -> TracedEdge:
     """The edge of the stable polygons as arcs of the curves that made it."""
     if not polygons:
         return TracedEdge(Arcs.of(()), ())

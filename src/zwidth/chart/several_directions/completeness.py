@@ -66,7 +66,7 @@ def walls_beside_regions(
     thetas     (n,) angles in (0, pi)
     """
     thetas = thetas[:: max(1, len(thetas) // MOST_ANGLES)]
-    pieces = [_walls(one, thetas) for one in equations if _moves_both(one)]
+    pieces = [_walls_with_pairs(one, thetas) for one in equations if _moves_both(one)]
     rows = np.vstack([np.empty((0, 3)), *pieces])
     rows = rows[(np.abs(rows) < FAR).all(axis=1)]
     walls = rows[_on_edge(loop, rows[:, 0], rows[:, 1:])][:, 1:]
@@ -78,6 +78,7 @@ def walls_beside_regions(
 
 
 def _is_one_law(equation: WallEquation) -> bool:
+    """Whether the law is the same along all directions of an equation."""
     return bool(np.ptp(equation.stiffness) == 0.0 and np.ptp(equation.damping) == 0.0)
 
 
@@ -87,13 +88,14 @@ def _moves_both(equation: WallEquation) -> bool:
 
 
 @np.errstate(all="ignore")  # walls at infinity are data
-def _walls(equation: WallEquation, thetas: Floats) -> Floats:
+def _walls_with_pairs(equation: WallEquation, thetas: Floats) -> Floats:
     """All walls with a pair of roots at these angles (n,), as rows (k, 3) of [theta, K T, B]."""
+    # k s + b v w = h, as at the file's head
     s, v = equation.stiffness[0], equation.damping[0]
     forces, stiffened, _ = equation.terms(thetas)
     known = np.isfinite(forces).all(axis=(1, 2)) & np.isfinite(stiffened).all(axis=(1, 2))
     thetas, forces, readings = thetas[known], forces[known], stiffened[known] / s
-    numbers = _eigenvalues(forces, readings)
+    numbers = _singular_numbers(forces, readings)
     w = equation.loop.velocity_response(np.exp(1j * thetas))[:, None]
     damping = numbers.imag / w.imag
     stiffness = numbers.real - damping * w.real
@@ -102,7 +104,7 @@ def _walls(equation: WallEquation, thetas: Floats) -> Floats:
     return np.asarray(rows[np.isfinite(rows).all(axis=1)])
 
 
-def _eigenvalues(forces: Complexes, readings: Complexes) -> Complexes:
+def _singular_numbers(forces: Complexes, readings: Complexes) -> Complexes:
     """All h (n, r) at which F + h Y is singular; forces F and readings Y (n, r, r)."""
     size = np.linalg.norm(np.concatenate([forces, readings], axis=1), axis=1, keepdims=True)
     F, Y = forces / size, readings / size
@@ -164,7 +166,7 @@ def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]
 
 
 def cut_lines(curves: Sequence[WallCurve], box: WallBox) -> list[shapely.LineString]:
-    """Every curve as far as it runs inside a box, and the box itself."""
+    """Every curve as far as it runs inside a box, and the box's own outline, in [K T, B]."""
     pieces: list[shapely.Geometry] = [shapely.box(*box.low, *box.high).exterior]
     for curve in curves:
         walls = curve.drawn
@@ -228,7 +230,7 @@ def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: WallBox) ->
     cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS]
     bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
     grids = [_grid(low, high, CELL_SIDE) for low, high in bounds]
-    walls = np.vstack([_grid(box.low, box.high, SIDE), *grids, *(_beside(cell, box) for cell in cells)])
+    walls = np.vstack([_grid(box.low, box.high, SIDE), *grids, *(_walls_beside(cell, box) for cell in cells)])
     radius = _raster_radii(loop, walls)
     union = shapely.MultiPolygon(polygons)
     inside = shapely.contains_xy(union, *walls.T)
@@ -287,7 +289,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
     return np.unique(thetas * (1.0 + BESIDE))
 
 
-def _beside(cell: shapely.Polygon, box: WallBox) -> Floats:
+def _walls_beside(cell: shapely.Polygon, box: WallBox) -> Floats:
     """Walls (n, 2) [K T, B] a little off a cell's outer edge, on both sides all along it."""
     edge = shapely.transform(cell.exterior, lambda points: points / box.size)
     share = (np.arange(ALONG) + 0.5) / ALONG

@@ -124,17 +124,21 @@ class RealRootEquation:
         return determinant(W)[:, None] / size, slopes / size
 
     def _eigenvalues(self, parameters: Floats) -> Floats:
-        """t (N, r) for s (N,), to the digits of an eigenvalue solver; nan for those that are not real."""
+        """t = (k + b w)/2 (N, r) for s (N,), to the digits of an eigenvalue solver; nan for those that are not
+        real."""
         root = np.sqrt(self.stiffness + self.damping)
         H = self.forces @ np.linalg.inv(self.readings) / np.outer(root, root)
         whole = H + parameters[:, None, None] * np.diag((self.stiffness - self.damping) / root**2)
         # of a symmetric matrix all are real, equal ones too
         t = -np.linalg.eigvalsh(whole) if _is_symmetric(H) else -np.linalg.eigvals(whole)
-        return np.sort(_real(t), axis=1)
+        return np.sort(_real_or_nan(t), axis=1)
 
 
 def real_root_walls(equation: WallEquation) -> tuple[list[StraightLine], list[RealRootEquation]]:
-    """Lines and curves of walls with a real root, of directions that the plant couples."""
+    """Lines and curves of walls with a real root, of directions that the plant couples.
+
+    Symbols are those of the file's head, with s and v of the law along each direction.
+    """
     lines: list[StraightLine] = []
     curves: list[RealRootEquation] = []
     s, v, T = equation.stiffness, equation.damping, equation.loop.period
@@ -149,7 +153,7 @@ def real_root_walls(equation: WallEquation) -> tuple[list[StraightLine], list[Re
         elif np.ptp(s) == 0.0 and np.ptp(v) == 0.0:  # one number in all directions
             across = np.array([s[0] / T, v[0] * w])
             length = float(np.hypot(*across))
-            numbers = _pencil(F, Y, scale)
+            numbers = _singular_numbers(F, Y, scale)
             lines += [StraightLine(across / length, number / length, angle, T) for number in numbers]
         else:
             curves.append(RealRootEquation(F, Y, s, v, w, angle, T))
@@ -161,6 +165,9 @@ def _lines_of_stiffness(
 ) -> list[StraightLine]:
     """Lines of walls with a root at z = 1 or -1, where the velocity estimate is 0.
 
+    F, Y   (r, r) forces and readings there
+    scale  of the plant's stiffness at other frequencies, which tells rounding from 0
+
     Free motions that the law only damps have a root at z = 1 for every wall (`MultiLoop.affine`): it is left out,
     and there are lines of those b that bring another one there.
     """
@@ -171,11 +178,11 @@ def _lines_of_stiffness(
         H, dH = inverse
         free, rest = _free_at_rest(H, s == 0.0, UNSPRUNG * scale)
         dw = float(equation.loop.estimator.response(z)[1].real)
-        damped = _pencil(free.T @ dH @ free, dw * (free.T * v) @ free, scale / dw)
-        sprung = _pencil(rest.T @ H @ rest, (rest.T * s) @ rest, scale)
+        damped = _singular_numbers(free.T @ dH @ free, dw * (free.T * v) @ free, scale / dw)
+        sprung = _singular_numbers(rest.T @ H @ rest, (rest.T * s) @ rest, scale)
         lines = [StraightLine(np.array([0.0, 1.0]), b, angle, T) for b in damped]
     else:
-        sprung, lines = _pencil(F, s[:, None] * Y, scale), []
+        sprung, lines = _singular_numbers(F, s[:, None] * Y, scale), []
     return [*lines, *(StraightLine(np.array([1.0, 0.0]), k * T, angle, T) for k in sprung)]
 
 
@@ -191,13 +198,13 @@ def _free_at_rest(H: Floats, unsprung: Flags, least: float) -> tuple[Floats, Flo
     return free, scipy.linalg.null_space(free.T) if free.size else np.eye(r)
 
 
-def _pencil(A: Floats, B: Floats, scale: float) -> list[float]:
+def _singular_numbers(A: Floats, B: Floats, scale: float) -> list[float]:
     """All real x with det(A + x B) = 0, A, B (r, r); scale: size of a large x, which tells rounding from 0."""
     if not len(A):
         return []
     alpha, beta = scipy.linalg.eig(A, -B, right=False, homogeneous_eigvals=True)
     finite = np.abs(beta) > 1e-12 * np.abs(beta).max(initial=0.0)
-    x = _real(alpha[finite] / beta[finite], ZERO * scale)
+    x = _real_or_nan(alpha[finite] / beta[finite], ZERO * scale)
     x = x[np.isfinite(x)]
     for _ in range(POLISH):
         W = A + x[:, None, None] * B
@@ -206,7 +213,7 @@ def _pencil(A: Floats, B: Floats, scale: float) -> list[float]:
     return [float(value) if abs(value) > ZERO * scale else 0.0 for value in x]
 
 
-def _real(x: Complexes | Floats, least: float = 0.0) -> Floats:
+def _real_or_nan(x: Complexes | Floats, least: float = 0.0) -> Floats:
     """Real parts of those x that are real but for rounding, nan for others; least: rounding of small ones."""
     return np.where(np.abs(x.imag) <= ROUNDING * np.abs(x) + least, x.real, np.nan)
 
@@ -255,7 +262,7 @@ class CurveSet:
         return replace(self, pairs=tuple(pairs))
 
     def within(self, box: WallBox, tolerance: float) -> tuple[CurveSet, list[WallCurve]]:
-        """The curves as they run through a box, and all samples that this took.
+        """These curves with all samples that this took, and the curves and lines as they run through a box.
 
         tolerance  largest distance of a chord from its curve, in shares of the box
         """
@@ -321,7 +328,7 @@ ROUNDS, SHARES = 4, (0.25, 0.5, 0.75)
 def followed_branches(
     equation: RootEquation, samples: BranchSamples, box: WallBox, scale: Floats, tolerance: float
 ) -> tuple[BranchSamples, list[CurvePoints]]:
-    """All branches that run through a box, followed by chords there; and the samples that this took.
+    """The samples that this took, and all branches that run through a box, followed by chords there.
 
     scale      (3,) size of u, k T and b
     tolerance  largest distance of a chord from its branch, in shares of the box
@@ -331,7 +338,7 @@ def followed_branches(
         inside = [branch for branch in branches if box.meets(branch.points[:, 1:]).any()]
         followed, unfit = [], [np.empty(0)]
         for branch in inside:
-            traced, parameters = _followed(equation, branch, box, scale, tolerance)
+            traced, parameters = _branch_with_chords(equation, branch, box, scale, tolerance)
             followed.append(traced)
             unfit.append(parameters)
         more = np.setdiff1d(np.concatenate(unfit), samples.parameters)
@@ -341,11 +348,15 @@ def followed_branches(
     return samples, followed
 
 
-def _followed(
+def _branch_with_chords(
     equation: RootEquation, branch: CurvePoints, box: WallBox, scale: Floats, tolerance: float
 ) -> tuple[CurvePoints, Floats]:
-    """A branch with more points, and parameters at which to sample where none fit."""
+    """A branch with more points, and parameters at which to sample where none fit.
+
+    scale, tolerance  as for `followed_branches`
+    """
     traced, unfit = branch.forwards(scale), [np.empty(0)]
+    # chords that are still to be looked at
     loose = np.ones(len(traced.points) - 1, dtype=bool)
     around = box.with_margin(BESIDE)
     for _ in range(HALVINGS):
@@ -357,11 +368,11 @@ def _followed(
         guess = traced.guess(k, np.full(len(k), 0.5), scale)
         middles, along, settled = correct_point(equation, guess, chord / scale**2, scale)
         along *= np.where(np.einsum("ni,ni->n", along, chord / scale) < 0.0, -1.0, 1.0)[:, None] * scale
-        fits = settled & _fits(points[k], chord, middles, scale)
+        fits = settled & _can_lie_halfway(points[k], chord, middles, scale)
         unfit.append(_steps_between(points[k[~fits]], points[k[~fits] + 1]))
         off = np.abs(middles - points[k] - 0.5 * chord)
         bent = off[:, 0] > BENT * np.abs(chord[:, 0]) + POINT_ROUNDING * np.abs(middles[:, 0])
-        finer = (bent | _turns(traced, k, box)) & (np.abs(chord[:, 1:] / box.size) > SMALLEST).any(axis=1)
+        finer = (bent | _turn_much(traced, k, box)) & (np.abs(chord[:, 1:] / box.size) > SMALLEST).any(axis=1)
         more = fits & ((off[:, 1:] / box.size > tolerance).any(axis=1) | finer)
         at = np.concatenate([np.arange(len(points)), k[more] + 0.5])
         order = np.argsort(at)
@@ -374,7 +385,7 @@ def _followed(
     return traced, np.concatenate(unfit)
 
 
-def _fits(first: Floats, chord: Floats, middles: Floats, scale: Floats) -> Flags:
+def _can_lie_halfway(first: Floats, chord: Floats, middles: Floats, scale: Floats) -> Flags:
     """Which middles can lie halfway on a curve along chords from points first, each (n, 3); scale: (3,)."""
     off = np.linalg.norm((middles - first - 0.5 * chord)[:, 1:] / scale[1:], axis=1)
     ahead = (middles - first)[:, 0] / np.where(chord[:, 0] == 0.0, np.inf, chord[:, 0])
@@ -388,7 +399,7 @@ def _steps_between(first: Floats, last: Floats) -> Floats:
     return np.asarray((u[apart, None] + step[apart, None] * np.array(SHARES)).ravel())
 
 
-def _turns(traced: CurvePoints, k: Ints, box: WallBox) -> Flags:
+def _turn_much(traced: CurvePoints, k: Ints, box: WallBox) -> Flags:
     """Which steps, from points k of a branch to the next, turn so much that a loop may hide there."""
     ahead = traced.directions[:, 1:] / box.size
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
@@ -399,13 +410,13 @@ def _turns(traced: CurvePoints, k: Ints, box: WallBox) -> Flags:
 ANGLES: Final = 2.0 ** np.arange(-2, 6)
 
 
-def _weights(count: int) -> Floats:
+def _extrapolation_weights(count: int) -> Floats:
     """Weights of a polynomial's values in the squares of so many of these angles for its value at 0."""
     x = ANGLES[:count]
     return np.array([np.prod([o**2 / (o**2 - y**2) for o in x if o != y]) for y in x])
 
 
-THREE, FOUR = _weights(3), _weights(4)
+THREE, FOUR = _extrapolation_weights(3), _extrapolation_weights(4)
 # What is extrapolated from these angles lies this close, in units of the curve's scale, to what the slope says.
 NEAR_PARABOLA: Final = 1e-3
 # A limit further away from the first sample than this, in units of the curve's scale, is none.
@@ -419,7 +430,7 @@ def with_limits(curve: TracedCurve, samples: BranchSamples) -> TracedCurve:
     for k in (0, -1):
         theta = traced.points[k, 0]
         end = 0.0 if theta == lowest else np.pi if theta == highest else None
-        limit = None if end is None else _limit(curve, k, end)
+        limit = None if end is None else _point_of_limit(curve, k, end)
         if limit is not None:
             points, directions = [limit, traced.points], [np.zeros((1, 3)), traced.directions]
             order = slice(None, None, 1 if k == 0 else -1)
@@ -428,10 +439,11 @@ def with_limits(curve: TracedCurve, samples: BranchSamples) -> TracedCurve:
     return replace(curve, traced=traced, limits=(limits[0], limits[1]))
 
 
-def _limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
+def _point_of_limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
     """The point (1, 3) in which a curve ends beside its point k; None where it goes to infinity."""
     point, direction = curve.traced.points[k], curve.traced.directions[k]
     with np.errstate(all="ignore"):
+        # walls are even in the angle from the end: half the slope times that angle leads from the end to the point
         slope = direction[1:] / direction[0]
         away = point[0] - end
         parabola = 0.5 * away * slope
@@ -457,10 +469,12 @@ REAL: Final = 1e-6
 
 
 def pair_lines(equation: WallEquation, thetas: Floats) -> list[StraightLine]:
-    """Lines of walls with a pair of roots, found between ascending angles (N,)."""
+    """Lines of walls with a pair of roots, found between ascending angles (N,), of an equation whose law has
+    stiffness only, or damping only."""
+    # one number moves the roots: b if the law damps, else k
     damped, T = bool((equation.damping > 0.0).any()), equation.loop.period
     across, unit = (np.array([0.0, 1.0]), 1.0) if damped else (np.array([1.0, 0.0]), T)
-    numbers = _numbers(equation, thetas)
+    numbers = _numbers_with_root(equation, thetas)
     lines = []
     for n in range(len(thetas) - 1):
         apart = np.abs(numbers[n][:, None] - numbers[n + 1]) / (
@@ -475,7 +489,7 @@ def pair_lines(equation: WallEquation, thetas: Floats) -> list[StraightLine]:
     return lines
 
 
-def _numbers(equation: WallEquation, thetas: Floats) -> Complexes:
+def _numbers_with_root(equation: WallEquation, thetas: Floats) -> Complexes:
     """Values (N, r) of b if the law damps, else of k, with a root at each angle (N,): real ones are walls."""
     A, B, C = equation.terms(thetas)
     moving = C if (equation.damping > 0.0).any() else B
@@ -483,13 +497,16 @@ def _numbers(equation: WallEquation, thetas: Floats) -> Complexes:
 
 
 def _real_number(equation: WallEquation, thetas: Floats, ends: tuple[complex, complex]) -> tuple[float, complex]:
-    """Angle between `thetas` (2,) at which a number of `_numbers`, `ends` there, is real, and the number at it."""
+    """Angle between `thetas` (2,) at which one of `_numbers_with_root` is real, and that number.
+
+    ends  its values at both angles
+    """
     low, high = (float(theta) for theta in thetas)
 
     def number(theta: float) -> complex:
         """The number x at an angle that is nearest to the straight line between those at both ends."""
         expected = ends[0] + (theta - low) / (high - low) * (ends[1] - ends[0])
-        every = _numbers(equation, np.array([theta]))[0]
+        every = _numbers_with_root(equation, np.array([theta]))[0]
         return complex(every[np.argmin(np.abs(every - expected))])
 
     theta = float(brentq(lambda theta: number(theta).imag, low, high, xtol=1e-300, rtol=1e-14))
@@ -507,7 +524,7 @@ def wall_equations(loop: MultiLoop) -> list[WallEquation]:
     z, d = on_circle(np.array(PROBES))
     P = loop.plant_slope(z, d)[0]
     law = loop.principal
-    S = _turned(P, law.stiffness, law.damping)
+    S = _least_coupled_directions(P, law.stiffness, law.damping)
     P = S @ P @ S.T
     equations: list[WallEquation] = []
     known: list[Complexes] = []
@@ -524,11 +541,14 @@ def wall_equations(loop: MultiLoop) -> list[WallEquation]:
     return equations
 
 
-def _turned(P: Complexes, stiffness: Floats, damping: Floats) -> Floats:
+def _least_coupled_directions(P: Complexes, stiffness: Floats, damping: Floats) -> Floats:
     """Directions (r, r), orthonormal, each in the place of one under the same law, that are coupled least.
 
     Where turning a set of directions of one law uncouples them at all angles, their axes are the eigenvectors of
     any mean of the responses there.
+
+    P                   (n, r, r)  responses at n angles
+    stiffness, damping  (r,)       of the law along each direction
     """
     r = len(stiffness)
     S = np.eye(r)
@@ -538,6 +558,7 @@ def _turned(P: Complexes, stiffness: Floats, damping: Floats) -> Floats:
             continue
         own = P[:, same][:, :, same]
         share = own / np.abs(own).max(axis=(1, 2))[:, None, None]
+        # weights that do not let what differs cancel
         mean = np.einsum("n,nij->ij", np.arange(1.0, len(P) + 1.0), share.real + 0.7 * share.imag)
         turn = np.linalg.eigh(mean + mean.T)[1].T
         if len(_coupled_sets(turn @ own @ turn.T)) > len(_coupled_sets(own)):
@@ -546,9 +567,11 @@ def _turned(P: Complexes, stiffness: Floats, damping: Floats) -> Floats:
 
 
 def _coupled_sets(P: Complexes) -> list[Ints]:
-    """Sets of directions that responses (n, r, r) couple: within one each leads to each."""
+    """Sets of directions, by index, that responses (n, r, r) couple: within a set each moves each, be it by way of
+    others."""
     r = P.shape[-1]
     own = np.sqrt(np.abs(np.diagonal(P, axis1=1, axis2=2)))
+    # a direction leads to another over at most r others: powers of the matrix of couplings
     coupled = (np.abs(P) > UNCOUPLED * own[:, :, None] * own[:, None, :]).any(axis=0)
     reached = np.linalg.matrix_power(coupled.astype(float) + np.eye(r), r) > 0.0
     sets = [np.flatnonzero(reached[k] & reached[:, k]) for k in range(r)]

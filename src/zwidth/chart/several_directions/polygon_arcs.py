@@ -58,7 +58,7 @@ def ring_arcs(curves: Sequence[WallCurve], ring: Floats, period: float) -> list[
     period  T [s]
     """
     size = float(np.max(np.ptp(ring, axis=0)))
-    runs = _long_runs(_runs(curves, ring), SHORT * size)
+    runs = _long_runs(_runs_of_sides(curves, ring), SHORT * size)
     corners = [_corner(curves, one, other, size) for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)]
     arcs = []
     for run, before, after in zip(runs, [corners[-1], *corners[:-1]], corners, strict=True):
@@ -73,11 +73,11 @@ def ring_arcs(curves: Sequence[WallCurve], ring: Floats, period: float) -> list[
     return arcs
 
 
-def _runs(curves: Sequence[WallCurve], ring: Floats) -> list[_CurveRun]:
+def _runs_of_sides(curves: Sequence[WallCurve], ring: Floats) -> list[_CurveRun]:
     """The sides of a ring (k, 2) [K T, B] in runs, each on one curve at neighbouring parameters."""
     sides = np.diff(ring, axis=0)
     length = np.hypot(sides[:, 0], sides[:, 1])
-    steps = _steps(curves, ring)
+    steps = _steps_near_ring(curves, ring)
     tree = shapely.STRtree(shapely.linestrings(np.stack([steps.first, steps.last], axis=1)))
     nearest = tree.nearest(shapely.points(0.5 * (ring[1:] + ring[:-1])))
     curve, sample = steps.curve[nearest], steps.sample[nearest]
@@ -96,12 +96,12 @@ def _long_runs(runs: list[_CurveRun], shortest: float) -> list[_CurveRun]:
     long_runs: list[_CurveRun] = []
     for run in (run for run in runs if run.length > shortest):
         long_runs = (
-            [*long_runs[:-1], _join(long_runs[-1], run)]
+            [*long_runs[:-1], _joined_run(long_runs[-1], run)]
             if long_runs and _continues(long_runs[-1], run)
             else [*long_runs, run]
         )
     if len(long_runs) > 1 and _continues(long_runs[-1], long_runs[0]):
-        long_runs = [_join(long_runs[-1], long_runs[0]), *long_runs[1:-1]]
+        long_runs = [_joined_run(long_runs[-1], long_runs[0]), *long_runs[1:-1]]
     return long_runs
 
 
@@ -110,7 +110,7 @@ def _continues(one: _CurveRun, other: _CurveRun) -> bool:
     return one.curve == other.curve and abs(other.samples[0] - one.samples[1]) <= NEIGHBOURS
 
 
-def _join(one: _CurveRun, other: _CurveRun) -> _CurveRun:
+def _joined_run(one: _CurveRun, other: _CurveRun) -> _CurveRun:
     """Two successive runs on one curve as one."""
     samples = one.samples[0], other.samples[1]
     return _CurveRun(one.curve, one.start, other.end, samples, other.corner, one.length + other.length)
@@ -139,7 +139,7 @@ class _CurveSteps:
         return float(self.start[k] + share * (self.end[k] - self.start[k]))
 
 
-def _steps(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
+def _steps_near_ring(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
     """All steps between samples of the curves that run near the ring, so that a side of it may lie on them."""
     around = WallBox(ring.min(axis=0), ring.max(axis=0)).with_margin(AROUND)
     parts: list[tuple[Floats, Floats, Ints, Ints, Floats, Floats]] = []
@@ -153,41 +153,42 @@ def _steps(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
 def _corner(
     curves: Sequence[WallCurve], one: _CurveRun, other: _CurveRun, size: float
 ) -> tuple[Wall, float, float]:
-    """The wall [K T, B] where a run ends and another begins, and the parameters of both there.
+    """The wall [K T, B] where run `one` ends and run `other` begins, and the parameters of both curves there.
 
     size  of the ring
     """
     a, b = curves[one.curve], curves[other.curve]
     solution: tuple[Floats, float, float] | None = None
-    for curve, line, run, beside in ((a, b, one.end, other.start), (b, a, other.start, one.end)):
-        end = curve.limit(run, line.real_angle) if line.real_angle is not None else None
+    # a curve of pairs of roots that ends on a line of real roots
+    for curve, line, place, beside in ((a, b, one.end, other.start), (b, a, other.start, one.end)):
+        end = curve.limit(place, line.real_angle) if line.real_angle is not None else None
         if end is not None:
-            foot = _foot(line, end[0], beside)
-            wall = _wall(line, foot)[0]  # to rounding, which a limit is not
+            foot = _parameter_at_wall(line, end[0], beside)
+            wall = _wall_with_slope(line, foot)[0]  # to rounding, which a limit is not
             solution = (wall, end[1], foot) if curve is a else (wall, foot, end[1])
     if solution is None:
-        solution = _meet(a, b, one.end, other.start, size)
+        solution = _common_wall(a, b, one.end, other.start, size)
     if solution is None or not np.max(np.abs(solution[0] - one.corner)) <= STRAY * size:
         solution = one.corner, one.end, other.start
     (x, y), end_, start = solution
     return (float(x), float(y)), float(end_), float(start)
 
 
-def _wall(curve: WallCurve, place: float) -> tuple[Floats, Floats]:
+def _wall_with_slope(curve: WallCurve, place: float) -> tuple[Floats, Floats]:
     """Wall (2,) [K T, B] at a parameter of a curve, and its slope (2,) by the parameter."""
     K, B, dK, dB = (float(value[0]) for value in curve.at(np.array([place]))[:4])
     return np.array([K * curve.period, B]), np.array([dK * curve.period, dB])
 
 
-def _on(curve: WallCurve, place: float) -> float:
+def _moved_onto_curve(curve: WallCurve, place: float) -> float:
     """A parameter, moved to the curve's nearer end where it lies beyond it."""
     return float(np.clip(place, curve.parameters[0], curve.parameters[-1]))
 
 
-def _foot(curve: WallCurve, wall: Floats, place: float) -> float:
+def _parameter_at_wall(curve: WallCurve, wall: Floats, place: float) -> float:
     """The parameter, near another one, at which a curve passes a wall that lies on it but for rounding."""
     for _ in range(5):
-        p, dp = _wall(curve, place)
+        p, dp = _wall_with_slope(curve, place)
         step = float((wall - p) @ dp / (dp @ dp))
         if not abs(step) < curve.reach(place):
             break
@@ -195,19 +196,23 @@ def _foot(curve: WallCurve, wall: Floats, place: float) -> float:
     return place
 
 
-def _meet(
+def _common_wall(
     a: WallCurve, b: WallCurve, start_a: float, start_b: float, size: float
 ) -> tuple[Floats, float, float] | None:
-    """Newton for the wall [K T, B] that two curves, or two places of one, share; None if it wanders off.
+    """Newton for the wall [K T, B] that two curves, or two places of one, share, and its parameters on a and on b;
+    None if it wanders off.
 
-    On one curve p(s) = p(t) holds wherever s = t, too: what must vanish there is (p(s) - p(t)) / (s - t).
+    start_a, start_b  parameters near it;   size  of the ring
+
+    With walls p(s) of a and q(t) of b, p - q must vanish. On one curve p(s) = p(t) holds wherever s = t, too: what
+    must vanish there is (p(s) - p(t)) / (s - t).
     """
     s, t, last = start_a, start_b, np.inf
     meant, apart = np.zeros(2), np.inf
     if a is b and abs(s - t) <= ONE_PLACE * abs(s):
         return None
     for _ in range(40):
-        (p, dp), (q, dq) = _wall(a, s), _wall(b, t)
+        (p, dp), (q, dq) = _wall_with_slope(a, s), _wall_with_slope(b, t)
         if np.abs(p - q).max() <= SETTLED * size:
             break
         if a is not b and np.abs(p - q).max() > apart and last < TANGENT * size:
@@ -219,7 +224,7 @@ def _meet(
         step = -np.linalg.solve(matrix, p - q)
         if not (abs(step[0]) < a.reach(s) and abs(step[1]) < b.reach(t)):
             return None
-        s, t = _on(a, s + float(step[0])), _on(b, t + float(step[1]))
+        s, t = _moved_onto_curve(a, s + float(step[0])), _moved_onto_curve(b, t + float(step[1]))
         meant, apart = 0.5 * (p + dp * step[0] + q + dq * step[1]), np.abs(p - q).max()
         moved = max(np.abs(dp * step[0]).max(), np.abs(dq * step[1]).max())
         if moved <= SETTLED * size or (moved > 0.5 * last and moved < NEARLY * size):
@@ -227,7 +232,7 @@ def _meet(
         last = moved
     if a is b and (s - t) * (start_a - start_b) < 0.0:
         s, t = t, s
-    return 0.5 * (_wall(a, s)[0] + _wall(b, t)[0]), s, t
+    return 0.5 * (_wall_with_slope(a, s)[0] + _wall_with_slope(b, t)[0]), s, t
 
 
 # Largest distance of a chord from its arc, in shares of the stable set's size.
@@ -256,7 +261,7 @@ class Branch:
         return K, B
 
     def zeros(self, arc: Arc, component: int) -> Floats:
-        """Parameters on an arc at which K, B or dK changes sign, to rounding."""
+        """Parameters on an arc at which K, B or dK (STIFFNESS, DAMPING or SLOPE) changes sign, to rounding."""
         places = arc.angles
         inside = self.curve.regular(places)
         places[0] += END_MARGIN * (places[1] - places[0])
@@ -304,7 +309,7 @@ class Branch:
 
 
 def sign_change_places(curve: WallCurve, places: Floats, component: int) -> Floats:
-    """Parameters between neighbours of `places` (n,) at which K, B or dK changes sign, to rounding.
+    """Parameters between neighbours of `places` (n,) at which K (component 0), B (1) or dK (2) changes sign.
 
     Where rounding hides the curve, as beside the wall 0, 0 of an undamped motion, there is nothing closer to find.
     """

@@ -63,7 +63,7 @@ class CurvePoints(NamedTuple):
         return cls(points, directions)
 
     def forwards(self, scale: Floats) -> CurvePoints:
-        """With directions of unit length in units of scale (3,), from point to point; 0 where none is known."""
+        """These points with directions of unit length in units of scale (3,), turned forwards; 0 where unknown."""
         steps = np.diff(self.points, axis=0) / scale
         with np.errstate(all="ignore"):
             steps /= np.linalg.norm(steps, axis=1)[:, None]
@@ -80,7 +80,7 @@ class CurvePoints(NamedTuple):
         """
         chord = (self.points[j + 1] - self.points[j]) / scale
         length = np.linalg.norm(chord, axis=1)[:, None]
-        off = []
+        off = []  # how far a tangent at each end, as long along the chord as that is, ends beside it
         for direction in (self.directions[j] / scale, self.directions[j + 1] / scale):
             along = np.einsum("ni,ni->n", direction, chord)[:, None] / length
             use = along > ALONG
@@ -102,6 +102,7 @@ def correct_point(
     scale    (3,) size of u, k T and b
     Returns  the points (n, 3), unit tangents there (n, 3) of either sign in units of scale, and which have settled
     """
+    # moved: numbers of the points that have not settled
     out, along, moved = points.copy(), np.zeros_like(points), np.arange(len(points))
     settled, last = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
     for _ in range(CORRECTIONS):
@@ -113,7 +114,7 @@ def correct_point(
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         off = np.einsum("ni,ni->n", normal, (out[moved] - points[moved]) / scale)
         across = _cross(slopes[:, 0], slopes[:, 1])
-        step = -_solve(slopes[:, 0], slopes[:, 1], normal, value, off)
+        step = -_solve_three(slopes[:, 0], slopes[:, 1], normal, value, off)
         length = np.linalg.norm(step, axis=1)
         sound = length < FARTHEST
         moved, step, length, across = moved[sound], step[sound], length[sound], across[sound]
@@ -130,12 +131,12 @@ def correct_point(
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Vector products (n, 3)."""
+    """Vector products a x b (n, 3)."""
     (a0, a1, a2), (b0, b1, b2) = a.T, b.T
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=1)
 
 
-def _solve(a: Floats, b: Floats, c: Floats, value: Floats, off: Floats) -> Floats:
+def _solve_three(a: Floats, b: Floats, c: Floats, value: Floats, off: Floats) -> Floats:
     """x (n, 3) with a x, b x = value (n, 2) and c x = off (n,), by Cramer's rule: not finite if singular."""
     first, second, third = _cross(b, c), _cross(c, a), _cross(a, b)
     total = value[:, :1] * first + value[:, 1:] * second + off[:, None] * third
@@ -206,7 +207,7 @@ class TracedCurve:
         return REACH
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """K, B, their slopes and the angles of the roots (k,) at places (k,)."""
+        """K, B, their slopes by the place, and the angles of the roots (k,) at places (k,)."""
         points = self.traced.points
         j = np.clip(np.floor(parameters), 0, len(points) - 2).astype(int)
         places, slopes = self.traced.guess(j, parameters - j, self.scale), points[j + 1] - points[j]
@@ -216,6 +217,7 @@ class TracedCurve:
             normals = chord / self.scale**2
             places[on], along, _ = correct_point(self.equation, places[on], normals, self.scale)
             along *= self.scale
+            # slopes by the place: the tangent, so long that it advances by the chord per step from point to point
             advance = np.einsum("ni,ni->n", along, normals)
             slopes[on] = along * (np.einsum("ni,ni->n", chord, normals) / advance)[:, None]
         unit = np.array([self.period, 1.0])

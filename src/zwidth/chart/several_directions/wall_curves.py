@@ -103,7 +103,7 @@ class StraightLine:
         return self.walls
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """K, B, their slopes and the angle (k,) at distances (k,) from the foot."""
+        """K, B, their slopes by the distance, and the angle of the root (k,) at distances (k,) from the foot."""
         x, y = (self.offset * self.across + parameters[:, None] * self.along).T
         dx, dy = self.along
         return (

@@ -121,7 +121,7 @@ class WallEquation:
             return inverse[0], one
         at = np.array([z], dtype=complex)
         P = (self.directions @ self.loop.plant_slope(at, at - 1.0)[0] @ self.directions.T).real
-        F, Y, _ = _columns(P, inverse[0][None])
+        F, Y, _ = _forces_and_readings(P, inverse[0][None])
         return F[0], Y[0]
 
     def inverse(self, z: float) -> tuple[Floats, Floats] | None:
@@ -134,8 +134,8 @@ class WallEquation:
         return (H, dH) if np.isfinite(H).all() else None
 
     def _frame(self, thetas: Floats) -> _Frame:
-        """Forces and readings at angles (N,)."""
-        z, d = on_circle(thetas)
+        """Forces and readings that the plant allows at angles (N,), and their slopes by the angle."""
+        z, d = on_circle(thetas)  # d = z - 1;  turn = dz/dtheta
         S, turn = self.directions, 1j * z[:, None, None]
         P, dP = (S @ X @ S.T for X in self.loop.plant_slope(z, d))
         w, dw = self.loop.estimator.response(z, d)
@@ -145,7 +145,7 @@ class WallEquation:
                 H, dH = (S @ X @ S.T for X in self.loop.inverse_slope(z, d))
             except np.linalg.LinAlgError:  # readings that depend on each other
                 H = dH = None
-        F, Y, small = _columns(P, H)
+        F, Y, small = _forces_and_readings(P, H)
         dF, dY = np.zeros_like(F), turn * dP @ F
         if dH is not None:
             dF, dY = np.where(small, turn * dH @ Y, 0.0), np.where(small, 0.0, dY)
@@ -157,7 +157,7 @@ class WallEquation:
         return f.F, s * f.Y, f.w[:, None, None] * (v * f.Y)
 
 
-def _columns(P: Matrices, H: Matrices | None) -> tuple[Matrices, Matrices, Flags]:
+def _forces_and_readings(P: Matrices, H: Matrices | None) -> tuple[Matrices, Matrices, Flags]:
     """Forces F and readings Y (N, r, r) with Y = P F, and which columns (N, 1, r) are small singular values' of P.
 
     Large singular values are taken from P, small ones from its inverse H, which was computed without forming P:
@@ -214,14 +214,17 @@ def _common_eigenvalues(A: Complexes, B: Complexes, C: Complexes) -> tuple[Compl
         k, b = np.full((2, len(A), A.shape[-1] ** 2), np.nan, dtype=np.complex128)
         k[sized], b[sized] = _common_eigenvalues(A[sized], B[sized], C[sized])
         return k, b
+    # A, B and C are brought to one size, and their columns too
     size = np.linalg.norm(A, axis=(1, 2))
     unit_k, unit_b = size / np.linalg.norm(B, axis=(1, 2)), size / np.linalg.norm(C, axis=(1, 2))
     B, C = B * unit_k[:, None, None], C * unit_b[:, None, None]
     columns = np.linalg.norm(np.concatenate([A, B, C], axis=1), axis=1, keepdims=True)
     A, B, C = A / columns, B / columns, C / columns  # errors of eigenvectors are those of their largest entries
     deltas = [_kron(X, Y) - _kron(Y, X) for X, Y in ((B, C), (C, A), (A, B))]
+    # two combinations of the Delta, of which neither is singular
     left, right = (sum(c * D for c, D in zip(cs, deltas, strict=True)) for cs in (LEFT, RIGHT))
     _, u = np.linalg.eig(np.linalg.solve(left, right))
+    # Rayleigh's quotients of the Delta at the common eigenvectors u, each over that of Delta_0
     row = np.conj(left @ u)
     own, k, b = (np.sum(row * (D @ u), axis=1) for D in deltas)
     return unit_k[:, None] * k / own, unit_b[:, None] * b / own
@@ -236,7 +239,10 @@ def _kron(X: Complexes, Y: Complexes) -> Complexes:
 def _newton_step(
     terms: tuple[Complexes, Complexes, Complexes], k: Complexes, b: Complexes
 ) -> tuple[Complexes, Complexes]:
-    """One step towards det W = 0 and its conjugate's, from k and b (N, q)."""
+    """k and b (N, q) after a step of Newton's method from them towards det W = 0 and its conjugate.
+
+    terms  A, B and C (N, r, r)
+    """
     rows = []
     for A, B, C in (terms, tuple(np.conj(X) for X in terms)):
         W = A[:, None] + k[..., None, None] * B[:, None] + b[..., None, None] * C[:, None]
@@ -253,6 +259,7 @@ def _trace(X: Complexes, Y: Complexes) -> Complexes:
 
 
 def _adjoint(X: Matrices) -> Matrices:
+    """Conjugate transposes of matrices (N, r, r)."""
     return np.conj(np.swapaxes(X, -1, -2))
 
 
@@ -289,6 +296,7 @@ def features(loop: MultiLoop) -> Complexes:
         A = np.block([[held.step, held.old], [np.zeros((m, len(held.step))), -np.eye(m)]])
         B, C = np.vstack([B, np.eye(m)]), np.hstack([C, np.zeros((m, m))])
     B, C = B / np.max(np.abs(B)), C / np.max(np.abs(C))
+    # zeros of the plant's response: of the pencil of step, input and reading
     whole = np.block([[A, B], [C, np.zeros((m, m))]])
     mass = scipy.linalg.block_diag(np.eye(len(A)), np.zeros((m, m)))
     with np.errstate(divide="ignore", invalid="ignore"):
