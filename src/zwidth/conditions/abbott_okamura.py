@@ -33,6 +33,7 @@ def stiffness_limit(
     b, friction, T, step = (
         np.asarray(v, dtype=float) for v in (device_damping, coulomb_friction, sampling_period, resolution)
     )
+    # without quantisation dry friction limits nothing; nan stays nan
     friction_limit = np.where(
         step > 0.0, 2.0 * friction / np.where(step > 0.0, step, 1.0), np.inf + 0.0 * friction
     )
@@ -45,7 +46,7 @@ def pure_spring_limit(stiffness: float, wall_damping: Floats) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The lesser of both limits on a loop, for walls with B = 0."""
+    """The lesser of both limits with the numbers of one loop, for walls with B = 0."""
     b, T = case.traits.ground_damping, case.loop.period
     largest = float(stiffness_limit(b, case.coulomb_friction, T, case.resolution))
     return case.bound(

@@ -73,7 +73,7 @@ def stiffness_limit_filtered(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound of a loop for a wall without velocity filter and delay."""
+    """Condition b > K T/2 + |B|, for a wall without velocity filter and delay, with the numbers of one loop."""
     b, T = case.traits.ground_damping, case.loop.period
     return case.bound(
         name="passive wall",
@@ -89,7 +89,7 @@ def condition(case: ConditionCase) -> Bound:
 
 
 def filtered_condition(case: ConditionCase) -> Bound:
-    """The bound of a loop for a wall with a first-order velocity filter."""
+    """The condition of `stiffness_limit_filtered` with the numbers of one loop."""
     b, T = case.traits.ground_damping, case.loop.period
     low_pass = case.loop.controller.velocity_filter
     tau = low_pass.time_constant if isinstance(low_pass, FirstOrder) else nan

@@ -201,7 +201,7 @@ def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
     crossings = _crossings(chart, wall_damping)
     width = max((float(np.max(np.abs(ring[:, 0]))) for ring in chart.regions), default=0.0)
     for stiffness in sorted((K for K in crossings if 1e-9 * width < K), reverse=True):
-        refined = _refined(chart, stiffness, wall_damping, width)
+        refined = _refined_edge(chart, stiffness, wall_damping, width)
         if refined is not None:
             return refined
     return 0.0
@@ -218,8 +218,11 @@ def _crossings(chart: StabilityChart, wall_damping: float) -> list[float]:
     return stiffnesses
 
 
-def _refined(chart: StabilityChart, stiffness: float, wall_damping: float, width: float) -> float | None:
-    """The edge near a stiffness by eigenvalues [N/m]; None where no edge is near, with stable walls below it."""
+def _refined_edge(chart: StabilityChart, stiffness: float, wall_damping: float, width: float) -> float | None:
+    """The edge near a stiffness by eigenvalues [N/m]; None where no edge is near, with stable walls below it.
+
+    width  largest |K| of the chart's regions [N/m], of which the search takes shares
+    """
 
     def excess(K: float) -> float:
         return float(spectral_radius(chart.loop, K, wall_damping)) - chart.radius
@@ -233,6 +236,7 @@ def _refined(chart: StabilityChart, stiffness: float, wall_damping: float, width
 
 
 def _ratio(admitted: float, exact: float) -> float:
+    """Stiffness that a condition admits over the exact one; nan unless that is above 0."""
     return admitted / exact if exact > 0.0 else nan
 
 

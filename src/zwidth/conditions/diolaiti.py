@@ -54,7 +54,7 @@ def viscous_stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The passive quadrant on a loop: the stiffness at which its corner is reached."""
+    """The stiffness up to which both frictions of a loop suffice, beta >= l + 1/2 and sigma >= 1/2, for B = 0."""
     loop, b = case.loop, case.traits.ground_damping
     viscous = float(viscous_stiffness_limit(b, loop.period, loop.controller.delay))
     dry = 2.0 * case.coulomb_friction / case.resolution if case.resolution != 0.0 else np.inf

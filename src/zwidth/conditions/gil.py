@@ -47,7 +47,7 @@ def stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The linear bound of a loop, as conditions are compared."""
+    """The linear condition with the numbers of one loop."""
     b, T = case.traits.ground_damping, case.loop.period
     delay = case.loop.controller.delay * T
     return case.bound(

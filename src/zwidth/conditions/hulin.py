@@ -55,7 +55,7 @@ def stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The linear condition on a loop, with all friction of device and hand that the wall feels."""
+    """The linear condition with the numbers of one loop, whose friction is that of device and hand together."""
     friction, T = case.traits.mode_damping if case.traits.has_one_mode else float("nan"), case.loop.period
     delay = case.loop.controller.delay * T
     return case.bound(

@@ -35,7 +35,7 @@ def stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The passive wall on a loop, its electrical damping counted as friction."""
+    """The condition of passive walls with the numbers of one loop, its electrical damping counted as friction."""
     b, e, T = case.traits.ground_damping, case.traits.electrical_damping, case.loop.period
     return case.bound(
         name="passive wall with electrical damping",

@@ -49,7 +49,7 @@ class OneMode:
         c = np.asarray(wall_damping, dtype=float) / self.period
         n, g, e, h, r = self.n, self.g, self.e, self.h, self.r
         low, high = np.full(c.shape, -inf), np.full(c.shape, inf)
-        # offset + slope k >= 0
+        # the module's three conditions as offset + slope k >= 0: roots z = 1, z = -1, and a pair
         for offset, slope in (
             (h + 0.0 * c, g + 0.0 * c),
             (4.0 - 2.0 * e + h - 2.0 * (2.0 * n - g) * c, g - 2.0 * n + 0.0 * c),
@@ -76,11 +76,12 @@ class OneMode:
         """
         n, g, e, h, r = self.n, self.g, self.e, self.h, self.r
         a0, a1, a2 = e - h, g - r * e, -r * g  # the pair's edge: r (1 + n c) k = a0 + a1 c + a2 c^2
+        # dampings c: 0; dk/dc = 0 on the pair's edge; the largest, |r c| = 1; the corner with the line of z = -1
         candidates = [0.0, *_roots(a2 * n, 2.0 * a2, a1 - n * a0)]
         if r != 0.0:
             candidates.append((1.0 - 1e-12) / abs(r))
         if 2.0 * n != g:
-            flip = (4.0 - 2.0 * e + h) / (2.0 * n - g)
+            flip = (4.0 - 2.0 * e + h) / (2.0 * n - g)  # k + 2 c on the line of z = -1
             candidates += _roots(a2 + 2.0 * r * n, a1 - r * (n * flip - 2.0), a0 - r * flip)
         B = np.array([c for c in candidates if c >= 0.0]) * self.period
         low, high = self.stiffness_interval(B)
@@ -110,7 +111,7 @@ def one_mode(mass: float, device_damping: float, stiffness: float, sampling_peri
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:
-    """Real roots of a x^2 + b x + c, computed without cancellation."""
+    """Finite real roots of a x^2 + b x + c, computed without cancellation; the one root where a is 0."""
     discriminant = b * b - 4.0 * a * c
     if discriminant < 0.0:
         return []
@@ -120,16 +121,16 @@ def _roots(a: float, b: float, c: float) -> list[float]:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound of a loop whose wall moves one mode: the exact region."""
-    t, T = case.traits, case.loop.period
+    """The exact region with the numbers of a loop whose wall moves one mode."""
+    traits, T = case.traits, case.loop.period
     taken = {
-        "mode_mass_kg": t.mode_mass,
-        "mode_damping_Ns_per_m": t.mode_damping,
-        "mode_stiffness_N_per_m": t.mode_stiffness,
+        "mode_mass_kg": traits.mode_mass,
+        "mode_damping_Ns_per_m": traits.mode_damping,
+        "mode_stiffness_N_per_m": traits.mode_stiffness,
         "sampling_period_s": T,
     }
     known = all(map(isfinite, taken.values()))
-    mode = one_mode(t.mode_mass, t.mode_damping, t.mode_stiffness, T) if known else None
+    mode = one_mode(traits.mode_mass, traits.mode_damping, traits.mode_stiffness, T) if known else None
     return case.bound(
         name="one mass, spring and damper",
         source="as thesis eq. 4.9 and 4.43, for both together; derived here",

@@ -44,6 +44,7 @@ class PassiveSet:
     def stiffness_limit(self, wall_damping: ArrayLike) -> Floats:
         """Largest passive stiffness at dampings B (...) [N/m]; 0 where no K > 0 is passive."""
         B = np.asarray(wall_damping, dtype=float)
+        # K S < room at each frequency: an upper limit of K where S > 0, a lower one where S < 0
         room = self.device_damping - B[..., None] * self.damper
         push, pull = self.spring > 0.0, self.spring < 0.0
         low = np.max(room[..., pull] / self.spring[pull], axis=-1, initial=0.0)
@@ -98,7 +99,7 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The theorem on a loop with its own delay and velocity estimate."""
+    """The theorem with the numbers of one loop: its own delay, filters and velocity estimate."""
     loop, b = case.loop, case.traits.ground_damping
     known = WHOLE_DELAY not in case.unmet and isfinite(b)
     passive = passive_set(loop, b) if known else None

@@ -81,7 +81,9 @@ def stiffness_limit(
     n1, n0, _, flip = held_force_response(x)
     inside = (d > -x) & (n0 * d < 1.0)
     safe = np.where(inside, d, 0.0)
+    # the pair's edge (4.9), and that of the root z = -1
     p = np.minimum((n1 + n0) * (x + safe) * (1.0 - n0 * safe) / (n0 * (1.0 + n1 * safe)), flip - 2.0 * safe)
+    # 0 (d + x) is nan where an argument is nan
     return np.asarray(np.where(inside, np.maximum(p, 0.0), 0.0 * (d + x)) * m / T**2)
 
 
@@ -164,7 +166,7 @@ def tangent_stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound (4.9) of a loop, with the root z = -1."""
+    """Condition (4.9), with that of the root z = -1, with the numbers of one loop."""
     m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     return case.bound(
         name="rigid mass with friction",
@@ -181,7 +183,7 @@ def condition(case: ConditionCase) -> Bound:
 
 
 def tangent_condition(case: ConditionCase) -> Bound:
-    """The bound (4.12) of a loop, as conditions are compared."""
+    """Condition (4.12) with the numbers of one loop."""
     m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     return case.bound(
         name="rigid mass with friction, soft walls",

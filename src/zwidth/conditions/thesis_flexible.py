@@ -46,7 +46,7 @@ def stiffness_edge(
     """
     B, m, k, T = (np.asarray(v, dtype=float) for v in (wall_damping, mass, stiffness, sampling_period))
     c, s = _cosine_and_bend(m, k, T)
-    u = s * B * T / m
+    u = s * B * T / m  # s d, in which (4.43) is p = 2 u (c - u)/(s (1 + u))
     inside = (u >= -(1.0 - c) / 2.0) & (u <= 1.0)
     u = np.where(inside, u, np.nan)
     return np.asarray(2.0 * u * (c - u) / (s * (1.0 + u)) * m / T**2)
@@ -125,14 +125,15 @@ def _area_of(c: Floats) -> Floats:
 
 
 def _tip(mass: Floats, stiffness: Floats, period: Floats) -> tuple[Floats, Floats]:
-    """u = sqrt(1 + c) - 1 without cancellation, 0 where c < 0; and s."""
+    """u = s d of the stiffest stable wall, sqrt(1 + c) - 1 without cancellation, 0 where c < 0; and s; both
+    (...)."""
     c, s = _cosine_and_bend(mass, stiffness, period)
     c = np.maximum(c, 0.0)
     return c / (np.sqrt(1.0 + c) + 1.0), s
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound (4.43) of a loop, as conditions are compared."""
+    """Condition (4.43) with the numbers of one loop."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     return case.bound(
         name="motor side on a spring",

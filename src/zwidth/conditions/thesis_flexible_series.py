@@ -47,6 +47,7 @@ def stiffness_limit(
     d, square = B * T / m, k * T**2 / m
     inside = (d > 0.0) & (d < 2.0 - square)
     p = 2.0 * d * (2.0 - d - square) / np.where(inside, 2.0 + d, 1.0)
+    # 0 p is nan where an argument is nan
     return np.asarray(np.where(inside, p, 0.0 * np.abs(p)) * m / T**2)
 
 
@@ -81,7 +82,7 @@ def linear_stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound (4.47) of a loop, as conditions are compared."""
+    """Condition (4.47) with the numbers of one loop."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     stiffness, damping = largest(m, k, T)
     return case.bound(
@@ -98,7 +99,7 @@ def condition(case: ConditionCase) -> Bound:
 
 
 def linear_condition(case: ConditionCase) -> Bound:
-    """The bound (4.48) of a loop, as conditions are compared."""
+    """Condition (4.48) with the numbers of one loop."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     return case.bound(
         name="linear condition on a slow spring",

@@ -30,6 +30,7 @@ def stiffness_limit(wall_damping: ArrayLike, mass: ArrayLike, sampling_period: A
     d = B * T / m
     inside = (d > 0.0) & (d < 2.0)
     p = 2.0 * d * (2.0 - d) / np.where(inside, 2.0 + d, 1.0)
+    # 0 p is nan where an argument is nan
     return np.asarray(np.where(inside, p * m / T**2, 0.0 * np.abs(p)))
 
 
@@ -57,7 +58,7 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound (4.14) of a loop, as conditions are compared."""
+    """Condition (4.14) with the numbers of one loop."""
     m, T = case.traits.rigid_mass, case.loop.period
     return case.bound(
         name="rigid mass",

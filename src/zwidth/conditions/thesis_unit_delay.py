@@ -37,7 +37,7 @@ def stiffness_limit(wall_damping: ArrayLike, mass: ArrayLike, sampling_period: A
     safe = np.where(inside, d, 0.0)
     root = (2.0 + safe) * np.sqrt(36.0 - 20.0 * safe + safe**2)
     p = 4.0 * safe * (4.0 - 4.0 * safe - safe**2) / (root + 12.0 + safe**2)
-    # at the largest damping rounding leaves a trace of either sign
+    # at the largest damping rounding leaves a trace of either sign; 0 d is nan where an argument is nan
     return np.asarray(np.maximum(p, 0.0) * m / T**2 + 0.0 * np.abs(d))
 
 
@@ -75,7 +75,7 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound (4.32) of a loop, as conditions are compared."""
+    """Condition (4.32) with the numbers of one loop."""
     m, T = case.traits.rigid_mass, case.loop.period
     return case.bound(
         name="rigid mass, one sample of delay",

@@ -58,6 +58,7 @@ def stiffness_limit(
     # along the edge d grows with t, so that its angle is found by bisection
     angle = _bisect(lambda t: edge(t, l)[1] - d, end)
     p = np.maximum(edge(angle, l)[0], 0.0)
+    # 0 d is nan where an argument is nan
     return np.asarray(np.where(inside, p, 0.0 * np.abs(d)) * m / T**2)
 
 
@@ -121,7 +122,7 @@ def _bisect(rising: Callable[[Floats], Floats], end: Floats) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The bound (4.26) of a loop, its delay rounded up to whole samples."""
+    """Condition (4.26) with the numbers of one loop, its delay rounded up to whole samples."""
     loop = case.loop
     m, T, l = case.traits.rigid_mass, loop.period, loop.whole_delay + (loop.fractional_delay > 0.0)
     stiffness, damping = largest(m, T, l)

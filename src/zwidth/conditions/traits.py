@@ -85,10 +85,10 @@ def traits(loop: Loop) -> Traits:
     moved_squared = [float(np.mean(squared[run])) for run in moved_modes]
     single = len(moved_squared) == 1 and _is_uncoupled(plant, shapes, moved_modes[0], push)
     sprung = single and moved_squared[0] > 0.0
-    mass, drag, electrical = _free_motion(plant, squared, shapes)
+    mass, drag, electrical = _numbers_of_free_motion(plant, squared, shapes)
     corners = tuple(1.0 / d.time_constant for d in plant.lagged_dampers if _damper_acts(d, shapes, moved_modes))
     mode_mass, mode_drag, mode_stiffness = (
-        _mode(plant, shapes, moved_modes[0], push, moved_squared[0]) if single else 3 * (nan,)
+        _numbers_of_mode(plant, shapes, moved_modes[0], push, moved_squared[0]) if single else 3 * (nan,)
     )
     if sprung:
         side_mass, side_stiffness = mode_mass, mode_stiffness
@@ -130,7 +130,11 @@ def _moved_modes(squared: Floats, push: Floats, read: Floats) -> list[slice]:
 
 
 def _is_uncoupled(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:
-    """Whether the motion that the wall makes in one group of modes stays in it, damping included."""
+    """Whether the motion that the wall makes in one group of modes stays in it, damping included.
+
+    shapes, run  (n, n)  mode shapes, one a column, and the columns of the group
+    push         (n,)    modal parts of the actuator's force
+    """
     motion = np.zeros(len(push))
     motion[run] = push[run]
     modal = shapes.T @ plant.damping @ shapes
@@ -140,10 +144,13 @@ def _is_uncoupled(plant: Plant, shapes: Floats, run: slice, push: Floats) -> boo
     return bool(np.all(np.abs(force - along) <= 1e-9 * np.max(scale, initial=0.0)))
 
 
-def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, squared: float) -> tuple[float, float, float]:
+def _numbers_of_mode(
+    plant: Plant, shapes: Floats, run: slice, push: Floats, squared: float
+) -> tuple[float, float, float]:
     """Mass [kg], friction [N s/m] and spring [N/m] of the one motion that the wall makes, 1 m at the actuator.
 
-    squared  its squared natural frequency [rad²/s²]
+    shapes, run, push  as of `_is_uncoupled`
+    squared            its squared natural frequency [rad²/s²]
     """
     mass = 1.0 / float(push[run] @ push[run])
     motion = mass * (shapes[:, run] @ push[run])
@@ -154,7 +161,7 @@ def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, squared: float
 
 def _is_damped(plant: Plant, shapes: Floats, moved_modes: list[slice]) -> bool:
     """Whether damping acts on a motion that the wall makes, directly or through another motion."""
-    modal = np.abs(shapes.T @ plant.damping @ shapes)
+    modal = np.abs(shapes.T @ plant.damping @ shapes)  # of each pair of modes
     worst = max((float(np.max(modal[run])) for run in moved_modes), default=0.0)
     return worst > UNDAMPED * float(np.max(modal))
 
@@ -174,10 +181,11 @@ def _uses_backward_difference(loop: Loop) -> bool:
     return bool(np.allclose(plain, (1.0 - 1.0 / z) / T, rtol=1e-9, atol=0.0))
 
 
-def _free_motion(plant: Plant, squared: Floats, shapes: Floats) -> tuple[float, float, float]:
-    """Mass, friction against the ground and electrical damping of the free motion at the actuator.
+def _numbers_of_free_motion(plant: Plant, squared: Floats, shapes: Floats) -> tuple[float, float, float]:
+    """Mass [kg], friction against the ground and electrical damping [N s/m] of the free motion at the actuator.
 
-    nan where there is no free motion, or no electrical damping
+    squared, shapes  (n,) squared natural frequencies, (n, n) mode shapes
+    Returns          three nan where there is no free motion; the last nan without electrical damping
     """
     mass = nan
     with suppress(ValueError):
@@ -210,7 +218,7 @@ def ground_friction(plant: Plant) -> float:
     frictions = plant.nonlinear.friction
     if not frictions:
         return 0.0
-    motion = _motion(plant)
+    motion = _motion_of_one_metre(plant)
     return float(sum(part.coulomb * abs(part.along @ motion) for part in frictions))
 
 
@@ -229,12 +237,12 @@ def reading_noise(plant: Plant) -> float:
     return float(np.sqrt(sum((part.weight * part.noise) ** 2 for part in plant.nonlinear.counters)))
 
 
-def _motion(plant: Plant) -> Floats:
+def _motion_of_one_metre(plant: Plant) -> Floats:
     """x of `ground_friction`, one number for each coordinate, with a.x = 1 m at the actuator."""
     a = plant.actuator
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     free = shapes[:, squared == 0.0]
     free_motion = free @ (free.T @ a)
-    acceleration = np.linalg.solve(plant.mass, a)
+    acceleration = np.linalg.solve(plant.mass, a)  # with which a force begins
     motion = free_motion if a @ free_motion > 1e-12 * (a @ acceleration) else acceleration
     return np.asarray(motion / (a @ motion))

@@ -74,7 +74,8 @@ class CubicPieces:
         return np.clip(np.searchsorted(self.nodes, at, side="right") - 1, 0, len(self.nodes) - 2)
 
     def at(self, at: Floats) -> tuple[Complexes, Floats]:
-        """Values and the errors to be allowed for, (m, k) each, at places (k,)."""
+        """Values of the functions and the errors to be allowed for, (m, k) each, at places (k,)."""
+        # Lagrange's weights of the two nodes to either side
         i = self.interval(at)
         window = np.clip(i - 1, 0, len(self.nodes) - 4)[:, None] + np.arange(4)
         x = self.nodes[window]
@@ -126,16 +127,19 @@ class Form:
 
     def growth(self) -> Floats:
         """By how much (k,) the errors move the edge of a disk at `nearest`, over s."""
-        own = self.e0 * self.nearest**2 + 2.0 * self.e1 * self.nearest + self.e2
-        return np.asarray(own / (np.sqrt(self.radius**2 + self.n0 * own) + self.radius + 1e-300))
+        error = self.e0 * self.nearest**2 + 2.0 * self.e1 * self.nearest + self.e2
+        # sqrt(R^2 + n0 error) - R over n0
+        return np.asarray(error / (np.sqrt(self.radius**2 + self.n0 * error) + self.radius + 1e-300))
 
     def larger(self) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (k,) of disks that hold every disk within these errors."""
+        # t of the module's text: 1/|p| loses least there, if n0 bears it
         taken = np.minimum(self.e0, KEPT * self.n0)
         t = np.minimum(1.0 / self.nearest, KEPT * self.n0 / self.e1)
-        own = self.n0 - taken - t * self.e1
+        n0 = self.n0 - taken - t * self.e1
+        # what n0 cannot bear of e0 comes off n2, as e0 |p|^2 up to the softest walls
         rest = (SOFTEST * self.nearest) ** 2 * (self.e0 - taken)
-        return self.n1 / own, (self.n2 - self.e2 - self.e1 / t - rest) / own
+        return self.n1 / n0, (self.n2 - self.e2 - self.e1 / t - rest) / n0
 
 
 @dataclass(frozen=True)
@@ -172,14 +176,14 @@ class DisksBetween:
         return Disks(angles, np.asarray(self.scale * C), self.scale * radius, self.scale**2 * X)
 
     def _interpolated(self, angles: Floats) -> tuple[Complexes, Floats]:
-        """C/s and (|C|^2 - R^2)/s^2 (n,) of the larger disks."""
+        """C/s and (|C|^2 - R^2)/s^2 (n,) at angles (n,), of disks made larger by what interpolation may miss."""
         kind = self.kind[self.ratio.interval(angles)]
         C, X = np.zeros(len(angles), dtype=complex), np.zeros(len(angles))
         for k in range(CENTRES + len(self.forms)):
-            own = kind == k
-            if np.any(own):
-                of_kind = self._by_centres if k < CENTRES else self._by_forms
-                C[own], X[own] = of_kind(angles[own], k)
+            of_kind = kind == k
+            if np.any(of_kind):
+                interpolate = self._by_centres if k < CENTRES else self._by_forms
+                C[of_kind], X[of_kind] = interpolate(angles[of_kind], k)
         low = angles < self.angles[0]
         if self.below is not None and np.any(low):
             C[low], X[low] = self.below._interpolated(angles[low])
@@ -192,13 +196,13 @@ class DisksBetween:
     def _by_centres(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (n,) at angles, interpolating C/s (kind 0), s/C (1) or log(C/s) (2)."""
         values, errors = self.centres.at(angles)
-        C, error = _centre(values[kind], errors[kind], kind)
+        C, error = _centre_and_error(values[kind], errors[kind], kind)
         (ratio,), (missed,) = self.ratio.at(angles)
         R = np.maximum(ratio.real, 0.0) + missed + (1.0 + np.abs(ratio)) * error
         return np.asarray(C), np.abs(C) ** 2 * (1.0 - R**2)
 
 
-def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floats]:
+def _centre_and_error(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floats]:
     """C/s (n,) and its relative error, from interpolated C/s (kind 0), s/C (1) or log(C/s) (2)."""
     if kind == 2:
         return np.exp(value), np.expm1(np.minimum(error, MOST))
@@ -218,7 +222,7 @@ def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
     disks  at ascending angles (k,), finite
     scale  1/|H| of the walls that matter [m/N]
     """
-    nodes = np.flatnonzero(_kept(disks.angles))
+    nodes = np.flatnonzero(_node_flags(disks.angles))
     if len(nodes) < FEWEST:
         return None
     sparse = nodes[:1]
@@ -230,11 +234,13 @@ def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
 
 
 def _disks_through(disks: Disks, nodes: Ints, scale: float, below: DisksBetween | None) -> DisksBetween:
-    """The interpolation of disks over angles, by those numbered `nodes`, of measured ones scaled by `scale`."""
+    """The interpolation of measured disks over angles, through those numbered `nodes` (k,), scaled by `scale`;
+    below: that of `DisksBetween`."""
     theta, C = disks.angles[nodes], disks.centre[nodes] / scale
     R, X = disks.radius[nodes] / scale, disks.power[nodes] / scale**2
     x, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C.real, C.imag, X])
     length, small = np.sqrt(1.0 + 2.0 * np.abs(C) ** 2 + X**2), np.sin(theta / 2.0)
+    # factors of (1, C, X), and whether each is even or odd at 0: unit length, and powers of sin(theta/2)
     scalings = [(1.0 / length, 1.0), (1.0 / length, -1.0), (small**0, 1.0), (small, -1.0), (small**2, 1.0)]
     forms = tuple(_pieces(x, form * scaling, sign * FORM_SIGNS) for scaling, sign in scalings)
     size = np.maximum(np.abs(C), 1e-300)
@@ -252,13 +258,13 @@ def _best_kind(nodes: Floats, centres: CubicPieces, ratio: CubicPieces, forms: t
     values, errors = centres.at(middle)
     (share,), (missed,) = ratio.at(middle)
     for kind in range(CENTRES):
-        C, error = _centre(values[kind], errors[kind], kind)
+        C, error = _centre_and_error(values[kind], errors[kind], kind)
         growth.append(np.abs(C) * (missed + (1.0 + np.abs(share)) * error))
     growth += [Form.at(one, middle).growth() for one in forms]
     return np.asarray(np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0))
 
 
-def _kept(angles: Floats) -> Flags:
+def _node_flags(angles: Floats) -> Flags:
     """Which angles (k,) are nodes: of two that all but coincide among more distant ones the second is none."""
     gaps = np.diff(np.concatenate([-angles[:1], angles, 2.0 * np.pi - angles[-1:]]))
     pair = (gaps[1:-1] < PAIR * gaps[:-2]) & (gaps[1:-1] < PAIR * gaps[2:])
@@ -268,6 +274,7 @@ def _kept(angles: Floats) -> Flags:
 
 
 def _mirrored_angles(angles: Floats) -> Floats:
+    """Ascending angles with the mirror images of MIRRORED of them below 0 and as many beyond pi."""
     return np.concatenate([-angles[MIRRORED - 1 :: -1], angles, 2.0 * np.pi - angles[: -MIRRORED - 1 : -1]])
 
 

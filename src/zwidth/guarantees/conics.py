@@ -67,8 +67,9 @@ class Conics:
 
         There H C is real and negative, and mu = |H| (|C| + R).
         """
-        at = self.pieces[:, :, 0]
-        K, B = at[:, C_B], -at[:, C_K]
+        at = self.pieces[:, :, 0]  # the functions at the beginning of each piece
+        K, B = at[:, C_B], -at[:, C_K]  # Im(H C) = 0
+        # of the two walls the one with Re(H C) < 0
         way = -np.sign(K * at[:, A_K] + B * at[:, A_B])
         K, B = way * K, way * B
         square = K * K * at[:, R_KK] + K * B * at[:, R_KB] + B * B * at[:, R_BB]
@@ -83,8 +84,8 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
     singular = _singularities(loop, at)
 
     def functions(angles: Floats) -> tuple[Floats, Floats]:
-        values, sizes = _functions(loop, aliases, angles)
-        return values, _noise(singular, angles) * sizes
+        values, sizes = _functions_and_sizes(loop, aliases, angles)
+        return values, _rounding_errors(singular, angles) * sizes
 
     panels = _panels(functions, np.log(panel_ends(loop, at)), POINTS - 2)
     if panels is None:
@@ -94,7 +95,7 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
     limit, below = _towards_zero(left[0] + (right[0] - left[0]) * nodes, values[0], nodes)
     left = np.append(left[0] - np.log(2.0) * np.arange(len(below), 0, -1), left)
     values, wide = np.concatenate([below, values]), np.append(np.ones(len(below), dtype=bool), wide)
-    return _cut(left, float(right[-1]), values, wide, limit, PIECES)
+    return _conics_of_panels(left, float(right[-1]), values, wide, limit, PIECES)
 
 
 def conics_of_disks(
@@ -115,7 +116,7 @@ def conics_of_disks(
     if panels is None:
         raise ValueError("a disk has no finite radius; its walls must be left out before")
     left, right, values, wide = panels
-    return _cut(left, float(right[-1]), values, wide, np.eye(6)[0], 1)
+    return _conics_of_panels(left, float(right[-1]), values, wide, np.eye(6)[0], 1)
 
 
 def _panel_nodes() -> Floats:
@@ -138,10 +139,10 @@ def _panels(
     for halving in range(HALVINGS + 1):
         x = left[:, None] + (right - left)[:, None] * nodes
         x[:, -1] = right
-        both = np.array(functions(np.minimum(np.exp(x), np.pi).ravel()))
-        if not np.all(np.isfinite(both)):
+        values_and_errors = np.array(functions(np.minimum(np.exp(x), np.pi).ravel()))
+        if not np.all(np.isfinite(values_and_errors)):
             return None
-        values, rounding = both.reshape(2, 10, len(left), POINTS).swapaxes(1, 2)
+        values, rounding = values_and_errors.reshape(2, 10, len(left), POINTS).swapaxes(1, 2)
         wide, good = _resolved(values, np.max(rounding, axis=-1), degree)
         good |= halving == HALVINGS or len(left) > MOST * len(ends)
         done.append((left[good], right[good], values[good], wide[good]))
@@ -155,19 +156,20 @@ def _panels(
     return left[order], right[order], values[order], wide[order]
 
 
-def _cut(left: Floats, end: float, values: Floats, wide: Flags, limit: Floats, count: int) -> Conics:
-    """`count` pieces each of adjoining panels that begin at log(angle) `left` (n,), the last of which ends at
-    `end`."""
+def _conics_of_panels(left: Floats, end: float, values: Floats, wide: Flags, limit: Floats, count: int) -> Conics:
+    """The conics of `count` pieces of each of adjoining panels, which begin at log(angle) `left` (n,), the last
+    ending at `end`; values (n, 10, POINTS) and wide (n,) of the panels, limit of `Conics`."""
     parts = left[:, None] + np.diff(np.append(left, end))[:, None] * np.arange(count) / count
     angles = np.exp(np.append(parts.ravel(), end))
-    pieces = np.einsum("mqp,nfp->nmfq", _cutting(_panel_nodes(), count), values).reshape(-1, 10, QUARTIC)
+    pieces = np.einsum("mqp,nfp->nmfq", _piece_matrices(_panel_nodes(), count), values).reshape(-1, 10, QUARTIC)
     return Conics(angles, np.ascontiguousarray(pieces), np.repeat(wide, count), limit)
 
 
 def panel_ends(loop: Loop, held_port: Port) -> Floats:
     """Ascending ends of the first panels, from the lowest angle to pi.
 
-    Panels grow geometrically away from zero and from each singularity.
+    Panels grow geometrically away from zero and from each singularity: by powers of two of its distance from the
+    circle, as far as half the way to zero.
     """
     poles = np.abs(held_port.poles) * loop.period
     lowest = min(LOWEST, BELOW * float(np.min(poles[poles > SLOWEST], initial=1.0)))
@@ -197,14 +199,17 @@ def _singularities(loop: Loop, held_port: Port) -> tuple[Floats, Floats, Floats]
     return centre, np.maximum(np.abs(singular.real), 1e-12 * singular.imag), singular.imag
 
 
-def _noise(singular: tuple[Floats, Floats, Floats], angles: Floats) -> Floats:
-    """Relative rounding error of the functions at angles (...): larger within lightly damped resonances."""
+def _rounding_errors(singular: tuple[Floats, Floats, Floats], angles: Floats) -> Floats:
+    """Relative rounding error of the functions at angles (...): larger within lightly damped resonances.
+
+    singular  of `_singularities`
+    """
     centre, width, turns = singular
     near = turns / np.hypot(angles[..., None] - centre, width)
     return np.asarray(NOISE * np.maximum(1.0, LIGHT * np.max(near, axis=-1, initial=0.0)))
 
 
-def _functions(loop: Loop, aliases: Aliases, angles: Floats) -> Floats:
+def _functions_and_sizes(loop: Loop, aliases: Aliases, angles: Floats) -> Floats:
     """The ten functions at angles (k,), and the size of the terms that are rounded: (2, 10, k).
 
     inf where a disk has an infinite radius.
@@ -221,7 +226,7 @@ def _functions(loop: Loop, aliases: Aliases, angles: Floats) -> Floats:
 
 
 def disk_functions(disks: Disks, w: Complexes) -> Floats:
-    """The ten functions (10, k) of disks (k,) with a velocity estimate w (k,)."""
+    """The ten functions (10, k), A_K to R_BB, of disks (k,) with a velocity estimate w (k,)."""
     C, X, V = disks.centre, disks.power, w * disks.centre
     R2 = np.maximum(disks.radius, LEAST * np.abs(C)) ** 2
     of_H = np.array([np.ones(len(w)), 2.0 * w.real, np.abs(w) ** 2])
@@ -230,10 +235,11 @@ def disk_functions(disks: Disks, w: Complexes) -> Floats:
 
 def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:
     """w at angles (k,), to full accuracy near zero."""
-    z, own = np.exp(1j * angles), loop.estimator
+    z, estimator = np.exp(1j * angles), loop.estimator
     d = z * one_less_z_inverse(angles)
     return np.asarray(
-        factor_response(own.numerator, own.denominator, d) * window_response(own.window, z), dtype=complex
+        factor_response(estimator.numerator, estimator.denominator, d) * window_response(estimator.window, z),
+        dtype=complex,
     )
 
 
@@ -245,6 +251,7 @@ def _resolved(values: Floats, rounding: Floats, degree: int) -> tuple[Flags, Fla
     """
     grid = chebyshev.chebpts2(POINTS)
     to_coefficients = np.linalg.inv(chebyshev.chebvander(grid, POINTS - 1))
+    # (n, 10): the last Chebyshev coefficients, and what each of the functions may have of them
     tail = np.abs((values @ to_coefficients.T)[..., degree:]).max(axis=-1)
     size = np.abs(values).max(axis=-1)
     centre = np.hypot(values[:, [A_K, A_B]], values[:, [C_K, C_B]])
@@ -263,8 +270,9 @@ def _resolved(values: Floats, rounding: Floats, degree: int) -> tuple[Flags, Fla
     return wide, good & ~(wide & (ratio.min(axis=-1) < THIN))
 
 
-def _cutting(nodes: Floats, count: int) -> Floats:
-    """Matrix from values at a panel's points to powers of s in each of its pieces (count, QUARTIC, POINTS)."""
+def _piece_matrices(nodes: Floats, count: int) -> Floats:
+    """Matrices (count, QUARTIC, POINTS) from values at a panel's points to coefficients of powers of s in each of
+    its pieces; nodes: `_panel_nodes`."""
     basis = np.linalg.inv(chebyshev.chebvander(2.0 * nodes - 1.0, POINTS - 1))
     inner = np.linspace(0.0, 1.0, QUARTIC)
     at = (np.arange(count)[:, None] + inner) / count
@@ -276,6 +284,7 @@ def _towards_zero(x: Floats, values: Floats, nodes: Floats) -> tuple[Floats, Flo
     """The conic at angle 0 (6,), and panels below the lowest (m, 10, POINTS), extrapolated from that one.
 
     x, values  log(angle) (POINTS,) of the lowest panel and the functions there (10, POINTS)
+    nodes      `_panel_nodes`
 
     The coefficients of a and b are even functions of the angle. Where a free motion is not damped they grow with a
     power of 1/angle; divided by that power they have a limit, and the constant 1 of the conic vanishes. How they
@@ -283,9 +292,11 @@ def _towards_zero(x: Floats, values: Floats, nodes: Floats) -> tuple[Floats, Flo
     """
     rows = [A_K, A_B, B_KK, B_KB, B_BB]
     ends = np.maximum(np.abs(values[rows][:, [0, -1]]), 1e-300)
+    # the largest order of growth, rounded to an even one
     growth = np.max(np.log(ends[:, 0] / ends[:, 1])) / (x[-1] - x[0])
     power = 2 * max(round(float(growth) / 2.0), 0)
     terms = values[rows] * np.exp(power * (x - x[-1]))
+    # limit and two even powers of the angle, in shares of the panel's upper end
     even = np.vander(np.exp(2.0 * (x - x[-1])), 3, increasing=True)
     fit = np.linalg.lstsq(even, terms.T, rcond=None)[0]
     limit = np.where(np.abs(fit[0]) > VANISHING * np.abs(terms).max(axis=1), fit[0], 0.0)

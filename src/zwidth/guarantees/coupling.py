@@ -169,7 +169,7 @@ def _excludes_springs(demand: CouplingDemand) -> bool:
 
 def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
     """The direction, an angle from k_c T to b_c, of the ray with the largest k_c among those with b_c >= 0: golden
-    section round `near`; of equal ones the least damped."""
+    section round `near`; of equal ones the least damped. reach: lengths (k,) of rays at directions (k,)."""
     step = np.pi / (DIRECTIONS - 1)
     low, high = max(near - step, 0.0), min(near + step, np.pi / 2.0)
     ratio = (np.sqrt(5.0) - 1.0) / 2.0
@@ -206,12 +206,14 @@ def softest_limit(demand: CouplingDemand, wall_stiffness: float, wall_damping: f
     """
     angles = demand.angles
     wall = 1.0 / coupling_impedance(wall_stiffness, wall_damping, angles, period)
-    shown = demand.centre + wall
+    shown = demand.centre + wall  # x + q
+    # the quadratic's constant term
     power = np.abs(wall) ** 2 + 2.0 * np.real(wall.conj() * demand.centre) + demand.power
     direction = np.linspace(0.0, np.pi / 2.0, DIRECTIONS)[:-1]
 
     def reach(direction: Floats) -> Floats:
         """Length (k,) of rays of allowed couplings in the plane of k_c T, b_c, at angles (k,); inf: no limit."""
+        # on the ray of length 1; mu scales 1/Z_c, so that its largest failing one is 1 over the length
         a = 1.0 / coupling_impedance(np.cos(direction) / period, np.sin(direction), angles, period)
         lean, size = np.real(a.conj() * shown), np.abs(a) ** 2
         with np.errstate(invalid="ignore", divide="ignore"):

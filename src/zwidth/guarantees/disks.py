@@ -83,8 +83,8 @@ class Aliases:
 
     @classmethod
     def of(cls, loop: Loop, held: Port) -> Aliases:
-        """The aliases' sums of a loop, its plant held at a port."""
-        near, far = _ranges(loop, held)
+        """The sums of a loop, its plant held at a port; the expansion begins as far out as it has to."""
+        near, far = _near_and_far(loop, held)
         expansion = _expansion(loop, held, far)
         for _ in range(MOVES):
             if expansion.misfit < MISSED or np.isinf(expansion.misfit):
@@ -92,7 +92,7 @@ class Aliases:
             far *= 4
             expansion = _expansion(loop, held, far)
         nodes = chebyshev.chebpts1(NODES) / 2.0
-        direct, swing = _terms(loop, held, nodes[:, None] + np.arange(near + 1, far + 1))
+        direct, swing = _alias_terms(loop, held, nodes[:, None] + np.arange(near + 1, far + 1))
         beyond_c, beyond_r = _sums_beyond(expansion, nodes, loop.fractional_delay)
         centre, radius = (direct - swing).sum(axis=1) + beyond_c, np.abs(swing).sum(axis=1) + beyond_r
         # aliases -k at x are the conjugates of aliases k at -x
@@ -102,7 +102,7 @@ class Aliases:
         """The disks at angles (k,) in (0, pi]."""
         theta = np.asarray(angles, dtype=float)
         k = np.arange(-self.near, self.near + 1)
-        direct, swing = _terms(self.loop, self.held_port, theta[:, None] / (2.0 * np.pi) + k)
+        direct, swing = _alias_terms(self.loop, self.held_port, theta[:, None] / (2.0 * np.pi) + k)
         p, q, others = direct[:, self.near], swing[:, self.near], k != 0
         at = theta / np.pi
         delay = np.exp(-1j * theta * self.loop.whole_delay)
@@ -113,13 +113,13 @@ class Aliases:
             centre, radius = common * (p - q + c), np.abs(common) * (np.abs(q) + r)
             power = np.abs(common) ** 2 * _power(p, q, c, r)
             if self.loop.has_fixed_feedback:
-                centre, radius, power = _closed(self.loop, theta, centre, radius, power)
+                centre, radius, power = _with_feedforward(self.loop, theta, centre, radius, power)
         unbounded = ~np.isfinite(radius)
         centre, radius = np.where(unbounded, 0.0, centre), np.where(unbounded, np.inf, radius)
         return Disks(theta, centre, radius, np.where(unbounded, -np.inf, power))
 
 
-def _closed(
+def _with_feedforward(
     loop: Loop, theta: Floats, centre: Complexes, radius: Floats, power: Floats
 ) -> tuple[Complexes, Floats, Floats]:
     """The disks (k,) of P/(1 - q P) for the P of disks |P - c| <= r, q the feedforward's response:
@@ -144,10 +144,10 @@ def _closed(
 
 
 def _power(p: Complexes, q: Complexes, c: Complexes, r: Floats) -> Floats:
-    """|p - q + c|^2 - (|q| + r)^2 without the cancellation of |q|^2; what rounding alone can leave is 0.
+    """|p - q + c|^2 - (|q| + r)^2 (k,) without the cancellation of |q|^2; what rounding alone can leave is 0.
 
     p - q and |q| are centre and radius of the lowest frequency's own disk: at low angles it is all but a half
-    plane, |q| many orders larger than what is left.
+    plane, |q| many orders larger than what is left. c and r are centre and radius that the other aliases add.
     """
     own_power = np.abs(p) ** 2 - 2.0 * np.real(p * q.conj())
     own_centre = np.abs(p - q)
@@ -171,7 +171,7 @@ def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
     )
 
 
-def _terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes, Complexes]:
+def _alias_terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes, Complexes]:
     """Of single aliases at w = 2 pi cycles / T, without the factor common to all: the response p to the actuator
     and the swing q that operators add. The alias's disk has centre p - q and radius |q|; inf where it has none."""
     T = loop.period
@@ -186,7 +186,7 @@ def _terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes, Comp
     return weight * response.direct / (1j * w), np.where(dead, np.inf, swing)
 
 
-def _ranges(loop: Loop, held_port: Port) -> tuple[int, int]:
+def _near_and_far(loop: Loop, held_port: Port) -> tuple[int, int]:
     """Number of aliases summed one by one, and that at which the expansion begins, beyond all poles."""
     lag = loop.controller.actuator_time_constant
     poles = np.append(held_port.poles, -1.0 / lag if lag > 0.0 else 0.0) * loop.period / (2.0 * np.pi)
@@ -213,15 +213,16 @@ def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
     """The `Expansion` of aliases beyond number `far`, fitted at Chebyshev nodes in t = far / cycles."""
     t = (1.05 + chebyshev.chebpts1(2 * TERMS)) / 2.05
     cycles = far / t
-    direct, swing = _terms(loop, held_port, cycles)
+    direct, swing = _alias_terms(loop, held_port, cycles)
     radius = np.abs(swing)
     if not np.all(np.isfinite(radius)):
         return Expansion(far, np.zeros(TERMS, dtype=complex), np.zeros(TERMS, dtype=complex), np.inf)
+    # centres turned back by the delay's part, without which they are smooth in t
     upright = (direct - swing) * np.exp(2j * np.pi * loop.fractional_delay * cycles)
     values = np.column_stack([upright, radius]) / (t * t)[:, None]
     powers = t[:, None] ** np.arange(TERMS)
     fit, *_ = np.linalg.lstsq(powers.astype(complex), values, rcond=None)
-    direct, swing = _terms(loop, held_port, np.array([0.5]))
+    direct, swing = _alias_terms(loop, held_port, np.array([0.5]))
     centre, radius = np.abs(direct - swing)[0], np.abs(swing)[0]
     near = np.maximum([centre, radius], SEEN * (centre + radius)) if centre + radius > 0.0 else np.ones(2)
     misfit = far * (np.abs(powers @ fit - values).max(axis=0) / near).max()
@@ -229,7 +230,8 @@ def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
 
 
 def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complexes, Floats]:
-    """Sums of centres and of radii (m,) over aliases x + k, k > far, x (m,) in (-1/2, 1/2), by expansion."""
+    """Sums of centres and of radii (m,) over aliases x + k, k > far, x (m,) in (-1/2, 1/2), by expansion; shift is
+    the delay's fraction. Radii inf where the expansion does not fall off."""
     if not expansion.misfit < FALLS:
         return np.zeros(len(x), dtype=complex), np.full(len(x), np.inf)
     first = expansion.far + 1
@@ -241,7 +243,11 @@ def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complex
 
 
 def _powers_beyond(order: int, start: Floats, shift: float, far: int) -> Complexes:
-    """Sum over k >= 0 of e^(-2 pi i shift (start + k)) (start + k)^-order: Lerch's integral by Laguerre's rule."""
+    """Sum over k >= 0 of e^(-2 pi i shift (start + k)) (start + k)^-order, at start (m,): Lerch's integral by
+    Laguerre's rule.
+
+    far  about the least start, which tells how many terms are to be summed before the rule holds
+    """
     if shift == 0.0:
         return np.asarray(zeta(order, start) + 0j, dtype=complex)
     turn = np.exp(-2j * np.pi * shift)
@@ -249,6 +255,7 @@ def _powers_beyond(order: int, start: Floats, shift: float, far: int) -> Complex
     count = ceil(min(max(30.0 / abs(1.0 - turn) - far, 0.0), 2e5))
     k = np.arange(count)
     direct = np.array([np.sum(turn**k * (first + k) ** -float(order)) for first in start])
+    # Lerch: the others are the integral of s^(order - 1) e^(-s)/(1 - turn e^(-s/last)) / (gamma(order) last^order)
     nodes, weights = roots_genlaguerre(40, order - 1)
     last = start + count
     tail = (weights / (1.0 - turn * np.exp(-nodes / last[:, None]))).sum(axis=1)
@@ -257,7 +264,8 @@ def _powers_beyond(order: int, start: Floats, shift: float, far: int) -> Complex
 
 
 def _interpolated(values: Complexes | Floats, at: Floats) -> Complexes:
-    """Values at the Chebyshev nodes of (-1, 1), interpolated at points (k,)."""
+    """Values (n,) at the n Chebyshev nodes of (-1, 1), interpolated at points (k,); inf unless all are
+    finite."""
     if not np.all(np.isfinite(values)):
         return np.full(len(at), np.inf) + 0j
     degree = len(values) - 1

@@ -59,7 +59,11 @@ class TouchingPoint:
 
 @compiled
 def _turning(own: CircleFactors, beside: CircleFactors, theta: float) -> float:
-    """Determinant of the derivatives by theta and by the spring, up to a positive factor."""
+    """Determinant of the wall's derivatives by theta and by the spring, up to a positive factor.
+
+    own, beside  factors of the loop with the spring, and with one a little stiffer (softer where the handle is
+                 fixed)
+    """
     K, B, dK, dB = wall_at(own, theta)
     K1, B1, _, _ = wall_at(beside, theta)
     turning: float = dK * (B1 - B) - dB * (K1 - K)
@@ -67,8 +71,9 @@ def _turning(own: CircleFactors, beside: CircleFactors, theta: float) -> float:
 
 
 @compiled
-def _touches(own: CircleFactors, beside: CircleFactors, first: float, last: float, pieces: int) -> Floats:
-    """Angles between two others at which the curve turns back, poles left out."""
+def _touching_angles(own: CircleFactors, beside: CircleFactors, first: float, last: float, pieces: int) -> Floats:
+    """Angles (n,) between two others at which the curve turns back: where `_turning` changes its sign between the
+    ends of `pieces` pieces, poles left out, at which it grows as they are approached."""
     out, n = np.empty(pieces), 0
     step = (last - first) / pieces
     before = _turning(own, beside, first)
@@ -94,14 +99,15 @@ def _touches(own: CircleFactors, beside: CircleFactors, first: float, last: floa
 def touching_points(
     springs: SpringFamily, share: float, first: float, last: float, pieces: int = PIECES
 ) -> list[TouchingPoint]:
-    """All touching points of the spring of a share between two angles."""
+    """All touching points of the spring of a share between two angles, looked for between the ends of so many
+    pieces."""
     pair = springs.neighbour_pair(share)
     if pair is None:
         return []
     own, beside = pair[0].circle, pair[1].circle
     first, last = max(min(first, last), 1e-7), min(max(first, last), np.pi - 1e-7)
     points = []
-    for theta in _touches(own, beside, first, last, pieces):
+    for theta in _touching_angles(own, beside, first, last, pieces):
         K, B, dK, dB = wall_at(own, float(theta))
         unit = springs.unit
         left = 1.0 if pair[0].stable_on_left(float(theta)) else -1.0
@@ -115,7 +121,8 @@ def touching_points(
 def nearest_touching_point(
     springs: SpringFamily, share: float, theta: float, reach: float
 ) -> TouchingPoint | None:
-    """The touching point of a spring nearest to an angle, within reach of it."""
+    """The touching point of the spring of a share nearest to an angle, within `reach` [rad] of it; None: there is
+    none."""
     for wide in reach * WINDOWS:
         points = touching_points(springs, share, theta - wide, theta + wide, 8)
         if points:
@@ -137,6 +144,8 @@ def envelope_between(
     Walks (n, 2), the stable side on their left, each with the shares of the springs at its ends. Where the
     envelope does not join the points the list is empty, and the share of a spring between them is added to
     `lost_shares`.
+
+    size   of the common set, for tolerances;   depth  how often the stretch may still be halved
     """
     length = float(np.hypot(*(other.wall - one.wall)))
     if shapely.distance(shape, shapely.LineString([one.wall, other.wall])) > length:
@@ -178,7 +187,8 @@ def _way(one: TouchingPoint, other: TouchingPoint) -> int:
 
 
 def _cubic(one: TouchingPoint, other: TouchingPoint, size: float) -> Floats | None:
-    """Points (k, 2) of the cubic between two touching points, along their tangents; None where it is too steep."""
+    """Points (k, 2) of the cubic between two touching points, along their tangents; None where one is too steep
+    against the chord, or the stable side changes. size: `envelope_between`."""
     gap = other.wall - one.wall
     length = float(np.hypot(*gap))
     if length == 0.0:
@@ -193,6 +203,7 @@ def _cubic(one: TouchingPoint, other: TouchingPoint, size: float) -> Floats | No
         if abs(rise) > STEEPEST * abs(run):
             return None
         slopes.append(rise / run)
+    # the cubic's distance from its chord, which tells how many points it takes
     sag = length * max(abs(slopes[0]), abs(slopes[1])) / 4.0
     x = np.linspace(0.0, 1.0, int(np.clip(np.sqrt(sag / (CHORD * size)), 1, 100)) + 1)
     y = length * (slopes[0] * x * (1.0 - x) ** 2 - slopes[1] * x * x * (1.0 - x))
@@ -240,7 +251,7 @@ class EnvelopeCuts:
                 self.touching_points[share] = self._touching(share)
         binding = {share for share, _ in edge}
         for one, other in self._neighbours(binding, shares, shape, NEAR * size):
-            self.strips.extend(_strips(self.springs, one, other, shape, size, self.lost_shares))
+            self.strips.extend(_strips_outside_envelope(self.springs, one, other, shape, size, self.lost_shares))
         return shapely.difference(shape, shapely.union_all(self.strips))
 
     def _touching(self, share: float) -> list[TouchingPoint]:
@@ -279,7 +290,7 @@ class EnvelopeCuts:
         before, now = start, start
         for part in STEPS:
             at = start.share + (share - start.share) * part if part < 1.0 else share
-            drift = 0.0
+            drift = 0.0  # of the angle, as between the two points before
             if now.share != before.share:
                 drift = (now.theta - before.theta) / (now.share - before.share) * (at - now.share)
             after = nearest_touching_point(self.springs, at, now.theta + drift, max(abs(drift), 0.05))
@@ -294,7 +305,7 @@ class EnvelopeCuts:
         return known[0] if known else now
 
 
-def _strips(
+def _strips_outside_envelope(
     springs: SpringFamily,
     one: TouchingPoint,
     other: TouchingPoint,

@@ -55,8 +55,9 @@ class Gauge:
         """
         if self.conics is None:
             return np.where((K == 0.0) & (B == 0.0), 0.0, np.inf), np.zeros(len(K))
-        mu, at = _largest(K, B, self.conics.angles, self.conics.pieces, self.conics.wide)
+        mu, at = _largest_mu(K, B, self.conics.angles, self.conics.pieces, self.conics.wide)
         with np.errstate(invalid="ignore"):
+            # at z = 1 a spring K with a compliance g, 1 + g K, fails from 1/mu = -1/(g K) on
             drift = np.max([np.where(K == 0.0, 0.0, -g * K) for g in self.static], axis=0)
         slow = np.maximum(_at_zero(K, B, self.conics.limit), drift)
         return np.maximum(mu, slow), np.where(slow > mu, 0.0, at)
@@ -81,7 +82,7 @@ def _at_zero(K: Floats, B: Floats, limit: Floats) -> Floats:
 
 @compiled
 def _mu(a: float, b: float, D: float) -> float:
-    """The larger root of mu^2 + 2 a mu + b, D = a^2 - b; 0 where no root is positive."""
+    """The larger root of mu^2 + 2 a mu + b, D = a^2 - b, without cancellation; 0 where no root is positive."""
     if not D >= 0.0 or (a >= 0.0 and b >= 0.0):
         return 0.0
     root: float = np.sqrt(D)
@@ -89,12 +90,12 @@ def _mu(a: float, b: float, D: float) -> float:
 
 
 @compiled
-def _state(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[float, float, float, float]:
-    """a, b, D and |H C| of a wall at the share s of the way through a piece. For narrow disks D is computed as
-    |H|^2 R^2 - Im(H C)^2, since a^2 - b cancels."""
+def _conic_at(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[float, float, float, float]:
+    """a, b, D and the size |Re H C| + |Im H C| of a wall at the share s of the way through a piece (10, 5) of
+    `Conics`. For narrow disks D is computed as |H|^2 R^2 - Im(H C)^2, since a^2 - b cancels."""
     KK, KB, BB = K * K, K * B, B * B
     a = across = square = 0.0
-    first = B_KK if wide else R_KK
+    first = B_KK if wide else R_KK  # `square` is b of wide disks, |H|^2 R^2 of narrow ones
     for q in range(QUARTIC - 1, -1, -1):
         a = a * s + (K * piece[A_K, q] + B * piece[A_B, q])
         across = across * s + (K * piece[C_K, q] + B * piece[C_B, q])
@@ -110,7 +111,8 @@ def _state(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[flo
 
 @compiled
 def _sag(x2: float, x3: float, x4: float, s: float, h: float) -> float:
-    """Largest distance of a quartic below its chord from s - h/2 to s + h/2, by coefficients x2, x3, x4."""
+    """Largest distance of a quartic below its chord from s - h/2 to s + h/2, by coefficients x2, x3, x4 of s^2 to
+    s^4: h^2/8 of its largest second derivative there."""
     bend = 2.0 * x2 + 6.0 * x3 * s + 12.0 * x4 * s * s
     sag: float = max(bend + 0.5 * h * (abs(6.0 * x3) + abs(24.0 * x4)), 0.0) * h * h / 8.0
     return sag
@@ -120,8 +122,9 @@ def _sag(x2: float, x3: float, x4: float, s: float, h: float) -> float:
 def _sags(K: float, B: float, piece: Floats, s: float, h: float) -> tuple[float, float]:
     """How far a and b of a wall can lie below their chords from s - h/2 to s + h/2."""
     KK, KB, BB = K * K, K * B, B * B
-    x, y, i = piece[A_K], piece[A_B], B_KK
-    ea = _sag(K * x[2] + B * y[2], K * x[3] + B * y[3], K * x[4] + B * y[4], s, h)
+    of_K, of_B, i = piece[A_K], piece[A_B], B_KK
+    ea = _sag(K * of_K[2] + B * of_B[2], K * of_K[3] + B * of_B[3], K * of_K[4] + B * of_B[4], s, h)
+    # coefficients of s^2, s^3 and s^4 in b
     b2 = KK * piece[i, 2] + KB * piece[i + 1, 2] + BB * piece[i + 2, 2]
     b3 = KK * piece[i, 3] + KB * piece[i + 1, 3] + BB * piece[i + 2, 3]
     b4 = KK * piece[i, 4] + KB * piece[i + 1, 4] + BB * piece[i + 2, 4]
@@ -129,24 +132,24 @@ def _sags(K: float, B: float, piece: Floats, s: float, h: float) -> tuple[float,
 
 
 @compiled
-def _bound(a: float, b: float, D: float, ea: float, eb: float) -> float:
-    """mu of a - ea and b - eb."""
+def _mu_below(a: float, b: float, D: float, ea: float, eb: float) -> float:
+    """mu of a - ea and b - eb, with D of these from that of a and b."""
     return _mu(a - ea, b - eb, D + ea * (ea - 2.0 * a) + eb)
 
 
 @compiled
-def _within(K: float, B: float, piece: Floats, wide: bool, best: float) -> float:
-    """The largest mu of a wall within a piece, or the best known if that is larger."""
+def _largest_within(K: float, B: float, piece: Floats, wide: bool, best: float) -> float:
+    """The largest mu of a wall within a piece, or the best known if that is larger, by halving stretches of it."""
     starts, widths = np.empty(DEPTH + 1), np.empty(DEPTH + 1)
-    starts[0], widths[0], waiting = 0.0, 1.0, 1
+    starts[0], widths[0], waiting = 0.0, 1.0, 1  # a stack of stretches, and how many of it are to be looked at
     while waiting > 0:
         waiting -= 1
         s, h = starts[waiting], widths[waiting]
-        a0, b0, D0, size = _state(K, B, piece, wide, s)
-        a1, b1, D1, _ = _state(K, B, piece, wide, s + h)
+        a0, b0, D0, size = _conic_at(K, B, piece, wide, s)
+        a1, b1, D1, _ = _conic_at(K, B, piece, wide, s + h)
         best = max(best, _mu(a0, b0, D0), _mu(a1, b1, D1))
         ea, eb = _sags(K, B, piece, s + 0.5 * h, h)
-        above = max(_bound(a0, b0, D0, ea, eb), _bound(a1, b1, D1, ea, eb))
+        above = max(_mu_below(a0, b0, D0, ea, eb), _mu_below(a1, b1, D1, ea, eb))
         if above <= best + SHARE * best + ROUNDING * size or waiting + 2 > DEPTH:
             continue
         h *= 0.5
@@ -157,24 +160,24 @@ def _within(K: float, B: float, piece: Floats, wide: bool, best: float) -> float
 
 
 @compiled
-def _largest(K: Floats, B: Floats, angles: Floats, pieces: Floats, wide: Flags) -> tuple[Floats, Floats]:
+def _largest_mu(K: Floats, B: Floats, angles: Floats, pieces: Floats, wide: Flags) -> tuple[Floats, Floats]:
     """Largest mu over all angles (k,) of walls (k,), and the angle at the start of the piece it comes from."""
     count, n = len(K), len(pieces)
     out, at = np.zeros(count), np.zeros(count)
-    a, b, D, size = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
+    a, b, D, size = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)  # at all ends of pieces
     for k in range(count):
         best, worst_piece = 0.0, 0
         for i in range(n + 1):
             j = min(i, n - 1)
-            a[i], b[i], D[i], size[i] = _state(K[k], B[k], pieces[j], wide[j], float(i - j))
+            a[i], b[i], D[i], size[i] = _conic_at(K[k], B[k], pieces[j], wide[j], float(i - j))
             mu = _mu(a[i], b[i], D[i])
             if mu > best:
                 best, worst_piece = mu, j
         for i in range(n):
             ea, eb = _sags(K[k], B[k], pieces[i], 0.5, 1.0)
-            above = max(_bound(a[i], b[i], D[i], ea, eb), _bound(a[i + 1], b[i + 1], D[i + 1], ea, eb))
+            above = max(_mu_below(a[i], b[i], D[i], ea, eb), _mu_below(a[i + 1], b[i + 1], D[i + 1], ea, eb))
             if above > best + SHARE * best + ROUNDING * size[i]:
-                inner = _within(K[k], B[k], pieces[i], wide[i], best)
+                inner = _largest_within(K[k], B[k], pieces[i], wide[i], best)
                 if inner > best:
                     best, worst_piece = inner, i
         out[k], at[k] = best, angles[worst_piece]

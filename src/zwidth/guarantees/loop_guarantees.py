@@ -76,7 +76,7 @@ def _guarantees(
         )
     chart = stability_chart(loop, decay=False).drawn()
     of_chart = next((each for each in premises if each.fails and each.what == AS_BENT), None)
-    stable = _stable(chart) if of_chart is None else empty_region(of_chart.reason)
+    stable = _stable_region(chart) if of_chart is None else empty_region(of_chart.reason)
     guarantees.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
     return Guarantees(loop, tuple(guarantees), chart, premises=premises)
 
@@ -124,19 +124,19 @@ def _spring_guarantees(
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
-            as_known(lambda: _of_springs(partial(spring_stable_region, progress=progress), moving)),
+            as_known(lambda: _spring_region(partial(spring_stable_region, progress=progress), moving)),
             SPRINGS,
         ),
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
-            as_known(lambda: _of_springs(nyquist_region, moving)),
+            as_known(lambda: _spring_region(nyquist_region, moving)),
             SPRINGS,
         ),
     ]
 
 
-def _stable(chart: StabilityChart) -> Region:
+def _stable_region(chart: StabilityChart) -> Region:
     """The chart's walls, stable with the device as described, as a region."""
     peak = chart.stiffness_max
     return Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
@@ -197,7 +197,7 @@ def _check_wall(wall: object) -> None:
     check_number("the wall's damping", wall[1], "N s/m")
 
 
-def _of_springs(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
+def _spring_region(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
     """The region that `find_region` makes of charts with springs at the handle; empty, with the reason, where
     there is no handle, a force sensor reads these springs, or a chart cannot be closed."""
     if loop.plant.handle is None:

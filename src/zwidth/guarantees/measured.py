@@ -53,13 +53,15 @@ def measured_disks(port: MeasuredPort, passed: Complexes) -> tuple[Disks, Flags]
     theta = port.theta
     jw = 1j * theta / port.period
     base = port.baseband
-    error = port.deviations[port.origin["hh"]] * np.abs(base["hh"] / _own(port, "hh"))
+    error = port.deviations[port.origin["hh"]] * np.abs(base["hh"] / _measured_samples(port, "hh"))
+    # power taken in at the handle, and what is left of it when the error is taken off
     taken = np.real(jw * base["hh"])
     least = taken - SURE * np.abs(jw) * error
     hidden = ~(least > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         q = np.where(hidden, np.inf, base["sh"] * base["ha"] * jw / (2.0 * least))
-        others, reach = _beyond(port)
+        others, reach = _alias_sums(port)
+        # c: what the aliases add to the centre p - q of the frequency's own disk
         p, c = base["sa"], port.sampled["sa"] - base["sa"] - others
         size = np.abs(passed)
         centre, radius = passed * (p - q + c), size * (np.abs(q) + reach)
@@ -69,13 +71,13 @@ def measured_disks(port: MeasuredPort, passed: Complexes) -> tuple[Disks, Flags]
     return Disks(theta, centre, radius, power), hidden
 
 
-def _own(port: MeasuredPort, name: str) -> Complexes:
+def _measured_samples(port: MeasuredPort, name: str) -> Complexes:
     """Samples of a path's measured response: those of the path itself, or of the path that it was derived from."""
     source = port.origin[name]
     return port.sampled[source] if source in port.sampled else port.baseband[source]
 
 
-def _beyond(port: MeasuredPort) -> tuple[Complexes, Floats]:
+def _alias_sums(port: MeasuredPort) -> tuple[Complexes, Floats]:
     """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; inf where they take in no
     power.
 
@@ -84,7 +86,7 @@ def _beyond(port: MeasuredPort) -> tuple[Complexes, Floats]:
     theta = np.append(port.theta, 0.5 * np.pi * (1.0 + chebyshev.chebpts1(NODES)))
     total, size = np.zeros(len(theta), dtype=complex), np.zeros(len(theta))
     for k in range(1, FAR + 1):
-        if k == NEAR + 1:
+        if k == NEAR + 1:  # from here on at the nodes alone
             near, theta = (total[:-NODES], size[:-NODES]), theta[-NODES:]
             total, size = np.zeros(NODES, dtype=complex), np.zeros(NODES)
         for turn in (2.0 * np.pi * k, -2.0 * np.pi * k):
@@ -98,16 +100,16 @@ def _beyond(port: MeasuredPort) -> tuple[Complexes, Floats]:
                 size = size + np.abs(q) * FAR  # terms fall like 1/k^2
     if not np.all(np.isfinite(size)):
         return near[0], np.full(len(port.theta), np.inf)
-    own = port.model.hold(theta) * theta
+    factor = port.model.hold(theta) * theta
     basis = chebyshev.chebvander(chebyshev.chebpts1(NODES), NODES - 1)
-    fitted = np.linalg.solve(basis, np.column_stack([total / own, size / np.abs(own)]))
+    fitted = np.linalg.solve(basis, np.column_stack([total / factor, size / np.abs(factor)]))
     far = chebyshev.chebvander(2.0 * port.theta / np.pi - 1.0, NODES - 1) @ fitted
-    own = port.model.hold(port.theta) * port.theta
-    return near[0] + far[:, 0] * own, near[1] + far[:, 1].real * np.abs(own)
+    factor = port.model.hold(port.theta) * port.theta
+    return near[0] + far[:, 0] * factor, near[1] + far[:, 1].real * np.abs(factor)
 
 
 def _softest_spring(disks: Disks) -> float:
-    """1/K of the softest spring that fails at a measured angle; where none fails, the size of the disks."""
+    """1/K [m/N] of the softest spring that fails at a measured angle; where none fails, the size of the disks."""
     across = disks.radius**2 - disks.centre.imag**2
     mu = np.where(across >= 0.0, np.sqrt(np.maximum(across, 0.0)) - disks.centre.real, 0.0)
     largest = float(np.max(mu))
@@ -115,7 +117,8 @@ def _softest_spring(disks: Disks) -> float:
 
 
 def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
-    """The walls that keep clear of every passive operator."""
+    """The walls that keep clear of every passive operator at a measured handle, which `loop` charts; empty, with
+    the reason, where the measurement does not tell them."""
     inner = port.theta < np.pi * (1.0 - 1e-9)
     for source in set(port.origin.values()):
         inner &= np.isfinite(port.deviations[source])

@@ -97,19 +97,19 @@ def feedback_obstacle(loop: Loop) -> str:
     return f"this is not known with {feedback_name(unlike[0])}" if unlike else ""
 
 
-def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:
+def _walls_along(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:
     """K and B of walls at a reach along directions (k,) in the plane of K T and B [N s/m]."""
     return reach * np.cos(directions) / period, reach * np.sin(directions)
 
 
-def _mu(loop_gauge: Gauge, directions: Floats, period: float) -> Floats:
+def _mu_along(loop_gauge: Gauge, directions: Floats, period: float) -> Floats:
     """mu of walls at reach 1 along directions (k,): 1 over the length of each ray [1/(N s/m)]."""
-    return loop_gauge.largest(*_walls(directions, np.ones(len(directions)), period))[0]
+    return loop_gauge.largest(*_walls_along(directions, np.ones(len(directions)), period))[0]
 
 
-def _ends(loop_gauge: Gauge, directions: Floats, period: float) -> Complexes:
+def _ray_ends(loop_gauge: Gauge, directions: Floats, period: float) -> Complexes:
     """Ends of the rays of passive walls along directions (k,): K T + j B [N s/m]; 0 where no wall is passive."""
-    return np.asarray(np.exp(1j * directions) / np.maximum(_mu(loop_gauge, directions, period), UNLIMITED))
+    return np.asarray(np.exp(1j * directions) / np.maximum(_mu_along(loop_gauge, directions, period), UNLIMITED))
 
 
 def _outline(loop_gauge: Gauge, period: float) -> tuple[Floats, Complexes]:
@@ -119,14 +119,14 @@ def _outline(loop_gauge: Gauge, period: float) -> tuple[Floats, Complexes]:
     Lightly damped modes cut narrow notches: directions in which an angle forbids walls of a chord are added.
     """
     directions = np.linspace(-np.pi, np.pi, 241)
-    ends = _ends(loop_gauge, directions, period)
-    left = np.arange(len(directions) - 1)
+    ends = _ray_ends(loop_gauge, directions, period)
+    left = np.arange(len(directions) - 1)  # numbers of the directions whose chord to the next is to be checked
     for _ in range(ROUNDS):
         for _ in range(BISECTIONS):
             if not len(left):
                 break
             middle = (directions[left] + directions[left + 1]) / 2.0
-            between = _ends(loop_gauge, middle, period)
+            between = _ray_ends(loop_gauge, middle, period)
             off = _off_chord(between, ends[left], ends[left + 1])
             directions, ends = np.insert(directions, left + 1, middle), np.insert(ends, left + 1, between)
             left = (left + np.arange(len(left)))[off]
@@ -136,7 +136,7 @@ def _outline(loop_gauge: Gauge, period: float) -> tuple[Floats, Complexes]:
             break
         at = np.searchsorted(directions, missed)
         directions = np.insert(directions, at, missed)
-        ends = np.insert(ends, at, _ends(loop_gauge, missed, period))
+        ends = np.insert(ends, at, _ray_ends(loop_gauge, missed, period))
         at += np.arange(len(missed))
         left = np.unique(np.concatenate([at - 1, at]))
     return directions, ends
@@ -168,18 +168,18 @@ def _off_chord(between: Complexes, first: Complexes, last: Complexes) -> Flags:
 
 def _stiffest(loop_gauge: Gauge, period: float, low: float, high: float) -> tuple[float, float]:
     """The largest K [N/m] among ray ends between two directions, and its B [N s/m]."""
-    top = np.array([_golden(loop_gauge, period, low, high)])
-    K, B = _walls(top, 1.0 / _mu(loop_gauge, top, period), period)
+    top = np.array([_stiffest_direction(loop_gauge, period, low, high)])
+    K, B = _walls_along(top, 1.0 / _mu_along(loop_gauge, top, period), period)
     return float(K[0]), float(B[0])
 
 
-def _golden(loop_gauge: Gauge, period: float, low: float, high: float) -> float:
+def _stiffest_direction(loop_gauge: Gauge, period: float, low: float, high: float) -> float:
     """The direction of the largest K in an interval in which it has one maximum; the least B of equal ones."""
     ratio = (np.sqrt(5.0) - 1.0) / 2.0
     ends = (low, high)
 
     def stiffness(direction: float) -> float:
-        return float(np.cos(direction) / _mu(loop_gauge, np.array([direction]), period)[0])
+        return float(np.cos(direction) / _mu_along(loop_gauge, np.array([direction]), period)[0])
 
     a, b = high - ratio * (high - low), low + ratio * (high - low)
     at_a, at_b = stiffness(a), stiffness(b)

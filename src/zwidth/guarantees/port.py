@@ -120,7 +120,7 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
     return PortResponse(*(np.concatenate(each).reshape(w.shape) for each in zip(*parts, strict=True)))
 
 
-def _stiff(held: Port, w: Floats) -> Floats:
+def _dynamic_stiffnesses(held: Port, w: Floats) -> Floats:
     """w_i^2 - w^2 (k, n) at frequencies (k,); exactly at an undamped mode, where the response is infinite, it is
     taken a rounding error beside it."""
     stiff = held.squared - w[:, None] ** 2
@@ -128,10 +128,10 @@ def _stiff(held: Port, w: Floats) -> Floats:
 
 
 def _modal_response(held: Port, w: Floats) -> tuple[Complexes | Floats, ...]:
-    """The fields of `PortResponse` at (k,) of modes that no damping couples."""
-    own = np.diag(held.damping)
-    compliance = 1.0 / (_stiff(held, w) + 1j * w[:, None] * own)
-    power = (np.abs(compliance) ** 2) @ (own * held.modal_port**2)
+    """The fields of `PortResponse`, in its order, (k,) each at w (k,), of modes that no damping couples."""
+    drag = np.diag(held.damping)
+    compliance = 1.0 / (_dynamic_stiffnesses(held, w) + 1j * w[:, None] * drag)
+    power = (np.abs(compliance) ** 2) @ (drag * held.modal_port**2)
     return (
         compliance @ (held.modal_actuator * held.modal_sensor),
         compliance @ (held.modal_port * held.modal_sensor),
@@ -142,21 +142,22 @@ def _modal_response(held: Port, w: Floats) -> tuple[Complexes | Floats, ...]:
 
 
 def _coupled_response(held: Port, w: Floats) -> tuple[Complexes | Floats, ...]:
-    """The fields of `PortResponse` at (k,) of modes that dampers couple."""
-    stiff = _stiff(held, w)
+    """The fields of `PortResponse`, in its order, (k,) each at w (k,), of modes that dampers couple."""
+    stiff = _dynamic_stiffnesses(held, w)
     damping: Complexes = np.broadcast_to(held.damping, (*w.shape, *held.damping.shape)).astype(complex)
     for damper in held.lagged:
         share = damper.damping / (1.0 + 1j * w * damper.time_constant)
         damping = damping + share[:, None, None] * np.outer(damper.along, damper.along)
-    own = np.abs(np.diagonal(damping, axis1=-2, axis2=-1))
-    scale = 1.0 / np.sqrt(np.hypot(stiff, w[:, None] * own))
+    drag = np.abs(np.diagonal(damping, axis1=-2, axis2=-1))
+    # each mode in units in which its own dynamic stiffness is 1
+    scale = 1.0 / np.sqrt(np.hypot(stiff, w[:, None] * drag))
     D = 1j * w[:, None, None] * damping
     index = np.arange(len(held.squared))
     D[:, index, index] += stiff
     D = D * scale[:, :, None] * scale[:, None, :]
     sources = np.stack([held.modal_actuator, held.modal_port], axis=-1) * scale[:, :, None]
     X = np.linalg.solve(D, sources.astype(complex)) * scale[:, :, None]
-    pushed, pulled = X[..., 0], X[..., 1]
+    pushed, pulled = X[..., 0], X[..., 1]  # motions by a force at the actuator, and at the port
     power = np.einsum("ki,kij,kj->k", pulled.conj(), damping.real, pulled).real
     return (
         pushed @ held.modal_sensor,
@@ -173,10 +174,10 @@ def static_compliances(plant: Plant, held: Floats) -> tuple[float, float]:
     inf (with its sign) where a rigid motion moves without limit. A spring at the port gives a compliance between
     the two.
     """
-    return _static(plant), _static(hold_fixed(plant, held))
+    return _static_compliance(plant), _static_compliance(hold_fixed(plant, held))
 
 
-def _static(plant: Plant) -> float:
+def _static_compliance(plant: Plant) -> float:
     """Static compliance of a plant from the wall's force to the reading [m/N]: sum of each mode's share over its
     squared frequency; inf, with its sign, where rigid motions respond."""
     if plant.size == 0:
@@ -193,7 +194,7 @@ def _static(plant: Plant) -> float:
 
 def hold_fixed(plant: Plant, held: Floats) -> Plant:
     """The plant with the coordinate `held` . x fixed, in coordinates of the motions that remain."""
-    return _within(plant, np.linalg.svd(held[None, :])[2][1:].T, None)
+    return _confined(plant, np.linalg.svd(held[None, :])[2][1:].T, None)
 
 
 def without_idle_motions(plant: Plant) -> Plant:
@@ -208,6 +209,7 @@ def without_idle_motions(plant: Plant) -> Plant:
     for force in plant.sampled_forces:
         ends += [force.along, force.reading]
     free = shapes[:, squared == 0.0]
+    # of the free motions only the combinations that one of the ends or dampers sees
     if free.shape[1]:
         drag = free.T @ plant.damping
         rows = [free.T @ end / np.linalg.norm(end) for end in ends]
@@ -222,9 +224,9 @@ def without_idle_motions(plant: Plant) -> Plant:
         return plant
     # what free motions are left has no stiffness, not even the rounding of what is left out
     stiffness = np.diag(np.append(np.zeros(free.shape[1]), squared[moved]))
-    return replace(_within(plant, V, plant.handle), mass=np.eye(len(stiffness)), stiffness=stiffness)
+    return replace(_confined(plant, V, plant.handle), mass=np.eye(len(stiffness)), stiffness=stiffness)
 
 
-def _within(plant: Plant, V: Floats, handle: Floats | None) -> Plant:
+def _confined(plant: Plant, V: Floats, handle: Floats | None) -> Plant:
     """The plant confined to x = V q, in coordinates q."""
     return replace(plant.on_motions(V), handle=None if handle is None else V.T @ handle)

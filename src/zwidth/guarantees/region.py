@@ -93,13 +93,13 @@ def empty_region(reason: str) -> Region:
 
 
 def polygon_rings(shape: Any) -> tuple[Floats, ...]:
-    """The rings of a polygon without holes, or of several."""
+    """Closed counter-clockwise rings (k, 2) of a polygon without holes, or of several, the largest first."""
     parts: Iterable[Any] = getattr(shape, "geoms", [shape])
     solid = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
     return tuple(np.asarray(orient(part).exterior.coords) for part in sorted(solid, key=lambda p: -p.area))
 
 
 def stiffest_corner(rings: Iterable[Floats]) -> tuple[float, float]:
-    """Largest K over the rings within K > 0, B >= 0, and its B; nan where there is none."""
+    """Largest K over rings (k, 2) of [K, B] within K > 0, B >= 0, and its B; nan where there is none."""
     peak = find_peak(Arcs.chords(list(rings)), (), 0.0)
     return (peak.stiffness, peak.damping) if peak else (float("nan"), float("nan"))

@@ -78,6 +78,7 @@ def nyquist_region(loop: Loop) -> Region:
         return empty_region("no spring at the handle puts a mode at the Nyquist frequency")
     springs = SpringFamily.of(Loop(without_idle_motions(loop.plant), loop.controller))
     share, *beside = springs.shares(k * np.array([1.0, 0.9, 1.1])).tolist()
+    # size of the open loop's characteristic polynomial at z = -1, with the Nyquist spring and one to either side
     poles = [abs(float(t.line("minus")[0])) for one in (share, *beside) if (t := springs.tracer(one)) is not None]
     if poles and poles[0] < DOUBLE**2 * max(poles):  # a double root at -1 that takes long to chart
         return empty_region(UNDAMPED)
@@ -113,18 +114,21 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
     if (alone := stable_alone(loop)).fails:
         return empty_region(alone.reason)
     springs = SpringFamily.of(Loop(without_idle_motions(loop.plant), loop.controller))
-    new = _spread(np.union1d(springs.shares(_grid(springs.loop, SPRINGS)), _alternating(springs)))
-    tried = np.union1d(springs.shares(_grid(springs.loop, TRIED)), _springs_of_one_alias(springs))
+    # springs to be charted, and those with which walls at the edge are tried
+    new = _coarse_first(
+        np.union1d(springs.shares(_spring_grid(springs.loop, SPRINGS)), _springs_of_alternating_root(springs))
+    )
+    tried = np.union1d(springs.shares(_spring_grid(springs.loop, TRIED)), _springs_of_one_alias(springs))
     members: dict[float, Member] = {}
     sweep = EnvelopeCuts(springs)
-    clean = 0
+    clean = 0  # rounds in a row in which no spring failed
     for turn in range(ROUNDS):
         if progress is not None:
             progress("springs at the handle", turn, ROUNDS)
         left = _common_shape(springs, new, members)
         if left.is_empty:
             return empty_region(NOTHING)
-        edge = _edge(springs, members)
+        edge = _edge_of_common_set(springs, members)
         left = sweep.cut(left, edge, np.array(sorted(members)))
         tried = np.unique(
             np.concatenate(
@@ -153,8 +157,9 @@ def _region(rings: tuple[Floats, ...], unit: float, reason: str) -> Region:
     return Region(walls, K, B, None if K > 0.0 else reason)
 
 
-def _grid(loop: Loop, count: int) -> Floats:
-    """Ascending springs from 0 to inf, spread by the frequency of the mode that each makes."""
+def _spring_grid(loop: Loop, count: int) -> Floats:
+    """Ascending springs (n,) [N/m] from 0 to inf, spread by the frequency of the mode that each makes: about
+    `count` up to the frequency BEYOND, and more for slow modes."""
     nyquist = np.pi / loop.period
     frequency = np.concatenate([np.geomspace(1e-3, 0.5, count // 3), np.linspace(0.5, BEYOND, count)]) * nyquist
     # not at the multiples of Nyquist's: an undamped mode there is a double root at -1, whose chart takes long
@@ -162,12 +167,13 @@ def _grid(loop: Loop, count: int) -> Floats:
     return np.unique(np.concatenate([[0.0], k[np.isfinite(k) & (k > 0.0)], [np.inf]]))
 
 
-def _alternating(springs: SpringFamily) -> Floats:
+def _springs_of_alternating_root(springs: SpringFamily) -> Floats:
     """Shares of the springs with which the line of walls with a root at z = -1 is nearest to the wall K = B = 0.
 
     A root there is vibration that alternates from sample to sample, at the Nyquist frequency or a multiple. These
-    lines, K + B w(-1) = -1/P(-1), are parallel: they have no envelope, but one of them binds, by `_distance`. It
-    belongs to a mode near such a frequency; there is a share for each that has one.
+    lines, K + B w(-1) = -1/P(-1), are parallel: they have no envelope, but one of them binds, by
+    `_stiffness_of_alternating_root`. It belongs to a mode near such a frequency; there is a share for each that
+    has one.
     """
     nyquist = np.pi / springs.loop.period
     multiples = nyquist * np.arange(1.0, ALIASES + 2.0)
@@ -176,25 +182,27 @@ def _alternating(springs: SpringFamily) -> Floats:
     for ends in np.sort(around):
         if 0.0 < ends[0] < ends[1] < 1.0:
             best = minimize_scalar(
-                lambda share: _distance(springs, float(share)),
+                lambda share: _stiffness_of_alternating_root(springs, float(share)),
                 bounds=(ends[0], ends[1]),
                 method="bounded",
                 options={"xatol": 1e-9},
             )
             # the double root that an undamped mode has there takes long to chart, and its neighbours tell as much
-            if best.fun > DOUBLE * min(_distance(springs, float(end)) for end in ends):
+            if best.fun > DOUBLE * min(_stiffness_of_alternating_root(springs, float(end)) for end in ends):
                 shares.append(float(best.x))
     return np.array(shares)
 
 
-def _distance(springs: SpringFamily, share: float) -> float:
-    """Stiffness |1/P(-1)| of the undamped wall with a root at z = -1 [N/m], with the spring of a share."""
+def _stiffness_of_alternating_root(springs: SpringFamily, share: float) -> float:
+    """Stiffness |1/P(-1)| of the undamped wall with a root at z = -1 [N/m], with the spring of a share; FAR where
+    no wall has one."""
     tracer = springs.tracer(share)
+    # a + s K + v B = 0 are the walls with that root
     a, s, _ = (1.0, 0.0, 0.0) if tracer is None else tracer.line("minus")
     return abs(float(a / s)) if s else FAR
 
 
-def _spread(shares: Floats) -> Floats:
+def _coarse_first(shares: Floats) -> Floats:
     """The same shares, coarsely spread ones first, so that springs that leave no wall are charted early."""
     order: list[int] = []
     for step in 2 ** np.arange(6)[::-1]:
@@ -203,7 +211,8 @@ def _spread(shares: Floats) -> Floats:
 
 
 def _common_shape(springs: SpringFamily, new: Floats, members: dict[float, Member]) -> shapely.Geometry:
-    """The walls [K unit, B] inside the charts of all `members` and of `new` springs, which join the members."""
+    """The walls [K unit, B] inside the charts of all `members`, by share, and of springs of `new` shares (n,),
+    which join the members."""
     unit = springs.unit
     left = None if not members else shapely.intersection_all([member_polygons(m, unit) for m in members.values()])
     for share in new.tolist():
@@ -222,7 +231,7 @@ def _common_shape(springs: SpringFamily, new: Floats, members: dict[float, Membe
     return shapely.MultiPolygon() if left is None else left
 
 
-def _edge(springs: SpringFamily, members: dict[float, Member]) -> Edge:
+def _edge_of_common_set(springs: SpringFamily, members: dict[float, Member]) -> Edge:
     """The edge of the common set, each arc with the share of its spring."""
     unit = springs.unit
     shares = {member.index: share for share, member in members.items()}
@@ -235,8 +244,8 @@ def _edge(springs: SpringFamily, members: dict[float, Member]) -> Edge:
 def _cells_and_failing(
     springs: SpringFamily, left: shapely.Geometry, tried: Floats, late: bool
 ) -> tuple[shapely.MultiPolygon, Floats]:
-    """Cells of a shape, without crumbs, and the springs that make walls of theirs unstable: the worst of each run
-    of neighbours; () if none.
+    """Cells of a shape, without crumbs, and shares (n,) of the springs `tried` that make walls of theirs unstable:
+    the worst of each run of neighbours, none if all are stable.
 
     Walls just inside the edge of a cell and one in its middle stand for it. If it is late, cells of which none is
     stable with every spring tried are left out; before, all of the edge may be what a few springs cut off.
@@ -246,10 +255,11 @@ def _cells_and_failing(
     cells = [cell for cell in polygons_of(left) if cell.area > CRUMB * left.area]
     if not cells:
         return shapely.MultiPolygon(), np.zeros(0)
-    walls = [_walls(cell, depth) for cell in cells]
+    walls = [_walls_to_try(cell, depth) for cell in cells]
     bad = np.split(
         springs.unstable(np.vstack(walls), tried), np.cumsum([len(some) for some in walls])[:-1], axis=1
     )
+    # bad[k] (springs, walls of cell k); a cell is dropped where each of its walls fails with some spring
     stable_cells = [k for k in range(len(cells)) if not (late and bad[k].any(axis=0).all())]
     count = sum((bad[k].sum(axis=1) for k in stable_cells), np.zeros(len(tried), dtype=int))
     worst = [i for i in range(len(tried)) if count[i] and count[i] == count[max(i - 1, 0) : i + 2].max()]
@@ -257,7 +267,7 @@ def _cells_and_failing(
     return shapely.MultiPolygon([cells[k] for k in stable_cells]), np.asarray(tried[np.array(worst, dtype=int)])
 
 
-def _walls(cell: shapely.Polygon, depth: float) -> Floats:
+def _walls_to_try(cell: shapely.Polygon, depth: float) -> Floats:
     """Walls (k, 2) of a cell [K unit, B]: one in its middle, then corners at a depth inside its edge."""
     inner = polygons_of(cell.buffer(-depth, join_style="mitre"))
     middle = np.array(cell.representative_point().coords)
@@ -273,7 +283,7 @@ def _spread_corners(ring: Floats) -> Floats:
 
 
 def _springs_between(members: dict[float, Member], edge: Edge) -> Floats:
-    """Shares of springs between those that bind and their neighbours."""
+    """Shares (n,) of springs between those whose arcs are the edge and their neighbours among the members."""
     shares = np.array(sorted(members))
     at = np.unique(np.searchsorted(shares, sorted({share for share, _ in edge})))
     first = np.unique(np.clip(np.concatenate([at - 1, at]), 0, len(shares) - 2))
@@ -282,7 +292,8 @@ def _springs_between(members: dict[float, Member], edge: Edge) -> Floats:
 
 
 def _springs_alike_at_edge(springs: SpringFamily, edge: Edge, turn: int) -> Floats:
-    """Shares of springs whose mode has an alias just beside vibrations at the edge, at other places each round."""
+    """Shares (n,) of springs whose mode has an alias just beside vibrations at the edge, at other places of its
+    arcs in each round, `turn`."""
     ends = np.array([(arc.start, arc.end) for _, arc in edge if arc.curved]).reshape(-1, 2)
     ends = ends[np.unique(np.linspace(0, len(ends) - 1, VIBRATIONS).astype(int))] if len(ends) else ends
     theta = ends[:, 0] + (0.5 + GOLDEN * turn) % 1.0 * (ends[:, 1] - ends[:, 0])

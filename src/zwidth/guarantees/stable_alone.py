@@ -83,26 +83,27 @@ def stable_alone(loop: Loop) -> Premise:
     drag = np.linalg.eigvalsh(shapes.T @ ((plant.damping + plant.damping.T) / 2.0) @ shapes)
     if drag[0] < -DAMPS * max(float(np.max(np.abs(drag))), np.finfo(float).tiny):
         return _by_poles(plant, squared)
-    below = shapes[:, squared < 0.0]
+    below = shapes[:, squared < 0.0]  # shapes v with v^T K v < 0
     if not below.shape[1]:
-        return _verdict(True)
+        return _premise(True)
     pull = np.einsum("ik,ik->k", below, plant.stiffness @ below)
     terms = np.einsum("ik,ik->k", np.abs(below), np.abs(plant.stiffness) @ np.abs(below))
     if not np.any(-pull > SIGN * terms):
-        return _verdict(None)
+        return _premise(None)
     poles = port(plant, plant.actuator).poles
-    return _verdict(False, float(np.max(poles.real, initial=0.0)))
+    return _premise(False, float(np.max(poles.real, initial=0.0)))
 
 
 def _by_poles(plant: Plant, squared: Floats) -> Premise:
-    """The premise of a plant some of whose dampers push, by its poles s [1/s]."""
+    """The premise of a plant some of whose dampers push, by its poles s [1/s]; squared (n,): squared natural
+    frequencies, 0 of free motions."""
     poles, error = _eigenvalues(port(plant, plant.actuator).generator)
     free = int(np.count_nonzero(squared == 0.0))  # of each at least one pole is exactly 0
     poles[np.argsort(np.abs(poles))[:free]] = 0.0
     growth = poles.real
     if np.any(growth > np.maximum(error, SIGN * np.abs(poles))):
-        return _verdict(False, float(np.max(growth)))
-    return _verdict(None if np.any((growth > -error) & (poles != 0.0)) else True)
+        return _premise(False, float(np.max(growth)))
+    return _premise(None if np.any((growth > -error) & (poles != 0.0)) else True)
 
 
 def _by_roots(loop: Loop) -> Premise:
@@ -111,16 +112,16 @@ def _by_roots(loop: Loop) -> Premise:
     period = loop.period
     hidden = float(np.max(states.hidden, initial=0.0))
     if not len(form.growth):
-        return _verdict(hidden <= SIGN / period, hidden)
+        return _premise(hidden <= SIGN / period, hidden)
     d, error = _eigenvalues(form.growth)
     neutral = zero_poles(states, loop.controller)
     d[np.argsort(np.abs(d))[:neutral]] = 0.0
     excess = d.real + 0.5 * np.abs(d) ** 2  # |z| - 1 without cancellation
     rate = max(float(np.max(np.log1p(2.0 * np.maximum(excess, 0.0)))) / (2.0 * period), hidden)
     if np.any(excess > np.maximum(BAND, error)) or hidden > SIGN / period:
-        return _verdict(False, rate)
+        return _premise(False, rate)
     near = (excess > -np.minimum(np.maximum(BAND, error), 0.5 * np.abs(d))) & (d != 0.0)
-    return _verdict(None if np.any(near) else True)
+    return _premise(None if np.any(near) else True)
 
 
 def _eigenvalues(matrix: Floats) -> tuple[Any, Floats]:
@@ -130,7 +131,7 @@ def _eigenvalues(matrix: Floats) -> tuple[Any, Floats]:
     return values, ROUNDING * len(values) * float(np.linalg.norm(matrix)) * condition
 
 
-def _verdict(holds: bool | None, rate: float = 0.0) -> Premise:
+def _premise(holds: bool | None, rate: float = 0.0) -> Premise:
     """The premise that `holds` (None: undecided), with the rate of growth [1/s] where it does not."""
     reason = ""
     if holds is None:

@@ -80,6 +80,7 @@ def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand
     h11, h12, h21, h22 = hybrid_matrix(loop, angles, held)
     with np.errstate(divide="ignore", invalid="ignore"):
         swing = h12 * h21 / (2.0 * h11.real)
+        # r - Re q, and Re h22 >= 0
         need = np.maximum(np.abs(swing) - (h22 - swing).real, -h22.real)
     return _demand(angles, h22, swing, need, h11.real)
 
@@ -105,7 +106,10 @@ def _demand(
     angles: Floats, fixed: Complexes, swing: Complexes, need: Floats, resistance: Floats
 ) -> CouplingDemand:
     """The demand of a device that shows the admittance `fixed` where it is held fixed, and up to the swing more or
-    less; inf where it dissipates nothing at the handle."""
+    less; inf where it dissipates nothing at the handle. All (k,).
+
+    need        least Re(1/Z_c) by the condition [m/(N s)];   resistance  Re h11 [N s/m]
+    """
     dead = ~(resistance > 0.0)
     centre, radius = np.where(dead, 0.0, fixed - swing), np.where(dead, np.inf, np.abs(swing))
     power = np.abs(fixed) ** 2 - 2.0 * np.real(fixed * swing.conj())

@@ -54,7 +54,7 @@ def measured_force(plant: Plant, sensor: ForceSensor) -> Floats:
         )
     rows = np.zeros((3, plant.size)) if plant.hand_force is None else plant.hand_force.copy()
     device = plant.mass + np.outer(h, rows[0])  # without the arm of a rigid grasp
-    at_handle = 1.0 / float(h @ np.linalg.solve(device, h))
+    at_handle = 1.0 / float(h @ np.linalg.solve(device, h))  # the effective mass there
     if not sensor.mass_beyond < at_handle:
         raise ModelError(
             f"mass_beyond is {sensor.mass_beyond:.6g} kg, and must be less than the device's mass at the handle, "
@@ -125,20 +125,20 @@ class _StateRows:
 
 
 class _FilterRows:
-    """A discrete filter among the rows."""
+    """A discrete filter whose states are some of the rows."""
 
     def __init__(self, rows: _StateRows, states: FilterStates) -> None:
         self.rows, self.states, self.at = rows, states, rows.add(len(states.A))
 
     def output(self, signal: Floats) -> Floats:
-        """A signal behind the filter, whose states go on by one sample."""
-        own, now = self.states, self.rows.current(self.at)
-        self.rows.change[self.at] += own.A @ now + np.outer(own.input, signal)
-        return np.asarray(own.output @ now + own.direct * signal)
+        """Row (N + 1,) of a signal (N + 1,) behind the filter, whose states go on by one sample."""
+        space, now = self.states, self.rows.current(self.at)
+        self.rows.change[self.at] += space.A @ now + np.outer(space.input, signal)
+        return np.asarray(space.output @ now + space.direct * signal)
 
 
 class _QueueRows:
-    """Past values of a signal among the rows, the newest first."""
+    """The last `count` values of a signal, which are some of the rows, the newest first."""
 
     def __init__(self, rows: _StateRows, count: int) -> None:
         self.rows, self.at = rows, rows.add(count)
@@ -165,7 +165,7 @@ class _HeldRows:
         self.queue = _QueueRows(rows, self.whole + (last or self.part > 0.0))
 
     def before(self) -> Floats:
-        """The command that acts just before the next sample."""
+        """Row (N + 1,) of the command that acts just before the next sample."""
         return np.asarray(self.queue.past()[self.whole])
 
     def push(self, command: Floats) -> tuple[Floats, Floats]:
@@ -210,10 +210,11 @@ class _SlowCommand:
                 self.acceleration = _FilterRows(rows, low_pass_states(self.ahead.acceleration_filter, T))
 
     def of(self, wall: Floats, reading: Floats, measured: Floats | None) -> Floats:
-        """The command of a sample, from the wall's force, the reading and the measured force."""
+        """Row (N + 1,) of the command of a sample, from those of the wall's force, the reading and the measured
+        force; None for the last where no sensor's feedback acts."""
         command = wall
         if self.sensor is not None and measured is not None:
-            known = self.late.push(measured)[-1]
+            known = self.late.push(measured)[-1]  # by the sensor's delay old
             if self.sensor.law == "force-error":
                 known = known + wall
             command = command + self.sensor.gain * self.on_sensor.output(known)
@@ -262,20 +263,21 @@ class _Period:
         measured = self._measured_force() if self.measures else None
         if measured is not None:
             self.measured = measured[: self.rows.size].copy()
-        own = [load.read(self.rows.current(self.at)) for load in self.loads]
+        # of each force of a load: (what acts now, what acts after the delay's part of a sample)
+        of_loads = [load.read(self.rows.current(self.at)) for load in self.loads]
         slow, later = self.slow.push(self.command.of(wall, reading, measured))
         fast = fast_later = np.zeros_like(wall)
         at = 0.0
-        for share, what in self._instants():
+        for share, event in self._instants():
             if share - at > SAME_INSTANT:
-                commands = np.array([slow + fast, *(before for before, _ in own)])
+                commands = np.array([slow + fast, *(before for before, _ in of_loads)])
                 self._advance((share - at) * self.controller.sampling_period, commands)
                 at = share
-            if what == SAMPLE:
+            if event == SAMPLE:
                 fast, fast_later = self.fast.push(self._fast_command())
-            elif what == SLOW:
-                slow, own = later, [(after, after) for _, after in own]
-            elif what == FAST:
+            elif event == SLOW:
+                slow, of_loads = later, [(after, after) for _, after in of_loads]
+            elif event == FAST:
                 fast = fast_later
         N = self.rows.size
         nothing = np.zeros(N)
@@ -284,7 +286,8 @@ class _Period:
         )
 
     def _instants(self) -> list[tuple[float, int]]:
-        """Times, in shares of the period, and kinds of its events, in order; samples before new commands."""
+        """Times, in shares of the period, and kinds of its events, in order: SAMPLE of the local loop, SLOW and
+        FAST, at which a new command of the wall's and of the local loop begins to act, and END."""
         instants = [(self.slow.part, SLOW), (1.0, END)]
         if self.local is not None:
             N = self.local.rate_multiple
@@ -293,6 +296,7 @@ class _Period:
         return sorted(instants)
 
     def _reading(self) -> Floats:
+        """Row (N + 1,) of the encoder's reading at this instant."""
         return np.asarray(self.states.output @ self.rows.current(self.at))
 
     def _measured_force(self) -> Floats:
@@ -321,7 +325,8 @@ class _Period:
         return np.asarray(command)
 
     def _advance(self, time: float, commands: Floats) -> None:
-        """Let the plant move for a time under held commands, the wall's and those of a load, a row each."""
+        """Let the plant move for a time [s] under held commands (1 + r, N + 1), the wall's and r of a load, a row
+        each."""
         lag, rows = self.controller.actuator_time_constant, self.rows
         growth, lagged, pushed = self._growth(time)
         states, forces = rows.current(self.at), rows.current(self.force_at)
@@ -332,10 +337,11 @@ class _Period:
 
     @cached_property
     def _known_growths(self) -> dict[float, tuple[Floats, Floats, Floats]]:
+        """What `_growth` has computed so far, by the time in shares of the period."""
         return {}
 
     def _growth(self, time: float) -> tuple[Floats, Floats, Floats]:
-        """The plant's growth over a time; equal parts of a period are computed once."""
+        """`PlantStates.growth` over a time [s]; equal parts of a period are computed once."""
         key = round(time / self.controller.sampling_period, 13)
         if key not in self._known_growths:
             self._known_growths[key] = self.states.growth(time, self.controller.actuator_time_constant)
@@ -350,9 +356,11 @@ def low_pass_states(low_pass: LowPass | None, period: float) -> FilterStates:
 
 def estimate_states(method: LinearMethod, low_pass: LowPass | None, period: float) -> FilterStates:
     """A velocity estimate and the low pass behind it in states."""
-    own = method.estimator(period)
+    estimate = method.estimator(period)
     top, bottom = (np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(low_pass, period))
-    return filter_states(np.vstack([own.numerator, top]), np.vstack([own.denominator, bottom]), own.window)
+    return filter_states(
+        np.vstack([estimate.numerator, top]), np.vstack([estimate.denominator, bottom]), estimate.window
+    )
 
 
 UNRESOLVED = 1e-2  # error of the response where it counts, by which two ways to compute it tell nothing of it
@@ -401,7 +409,7 @@ def closed_sections(plant: Plant, controller: Controller) -> ClosedSections:
 
 
 def closed_table(closed: ClosedSections, controller: Controller) -> LoopTable:
-    """The loop in the form in which kernels take it."""
+    """The table of one loop: the closed plant's section, its other factors as the force path, and the wall law."""
     bare = replace(controller.wall_alone, delay=float(closed.delay), force_filter=None, actuator_time_constant=0.0)
     table = loop_table(closed.sections.rows[None], np.ones(1, dtype=np.int64), bare)
     factors = np.concatenate([closed.factors.numerator, closed.factors.denominator], axis=-1)
@@ -411,55 +419,61 @@ def closed_table(closed: ClosedSections, controller: Controller) -> LoopTable:
 def zero_poles(states: PlantStates, controller: Controller) -> int:
     """How many poles stay at z = 1 exactly: as many as the plant has, for the places and speeds of free motions,
     unless a feedback answers to these. That of the force sensor answers to neither."""
-    own = sum((mode.squared == 0.0) * (1 + (mode.decay == 0.0)) for mode in states.modes)
+    # a free mode rests at any place, and without damping moves on at any speed
+    of_plant = sum((mode.squared == 0.0) * (1 + (mode.decay == 0.0)) for mode in states.modes)
     if states.form is not None:
-        own += int(np.count_nonzero(states.form.poles == 0.0))
+        of_plant += int(np.count_nonzero(states.form.poles == 0.0))
     if states.sampled:
-        own = states.neutral
-    kept = [own]
+        of_plant = states.neutral
+    kept = [of_plant]
     for feedback in controller.fixed_feedback:
         match feedback:
             case LocalLoop():
-                kept.append(0 if feedback.stiffness else 1)
+                kept.append(0 if feedback.stiffness else 1)  # damping alone still leaves the place
             case Feedforward():
-                kept.append(1 if feedback.damping else 2)
+                kept.append(1 if feedback.damping else 2)  # inertia alone leaves place and speed
             case ForceSensor():
                 pass
     return int(min(kept))
 
 
 def _known_zeros(controller: Controller, others: int) -> Complexes:
-    """Zeros that the closed plant has beside those of the path from a command to the reading: of the force filter
-    and a force error, poles of the feedback's filters, and z = 0.
+    """Zeros (k,) in d = z - 1 that the closed plant has beside those of the path from a command to the reading: of
+    the force filter and a force error, poles of the feedback's filters, and z = 0.
 
     others  number of states beside those of the path
     """
     T, sensor, ahead = controller.sampling_period, controller.force_sensor, controller.feedforward
     above, below = low_pass_factors(controller.force_filter, T)
-    own = list[complex]()
+    of_feedback = list[complex]()
     if sensor is not None and acts(sensor):
-        own += _sensor_zeros(sensor, T)
+        of_feedback += _sensor_zeros(sensor, T)
     if ahead is not None and acts(ahead):
-        own += factor_roots(ahead.velocity.estimator(T).denominator.tolist())
+        of_feedback += factor_roots(ahead.velocity.estimator(T).denominator.tolist())
         for low_pass in (ahead.velocity_filter, ahead.acceleration_filter if ahead.inertia else None):
-            own += factor_roots(low_pass_factors(low_pass, T)[1])
-    past = others - len(own) - len(factor_roots(below))
-    return np.array([*factor_roots(above), *own, *[-1.0] * past], dtype=np.complex128)
+            of_feedback += factor_roots(low_pass_factors(low_pass, T)[1])
+    # all other states hold past values: zeros z = 0, d = -1
+    past = others - len(of_feedback) - len(factor_roots(below))
+    return np.array([*factor_roots(above), *of_feedback, *[-1.0] * past], dtype=np.complex128)
 
 
 def _sensor_zeros(sensor: ForceSensor, period: float) -> list[complex]:
-    """The poles of a force sensor's filter L; of a force error, which the wall's force passes, too, the zeros of
-    1 + gain L."""
+    """The poles, in d = z - 1, of a force sensor's filter L; of a force error, which the wall's force passes, too,
+    the zeros of 1 + gain L."""
     if sensor.law == "force-feedforward":
         return factor_roots(low_pass_factors(sensor.filter, period)[1])
-    own = low_pass_states(sensor.filter, period)
-    inverse = own.A - sensor.gain / (1.0 + sensor.gain * own.direct) * np.outer(own.input, own.output)
+    low_pass = low_pass_states(sensor.filter, period)
+    # the states of 1 / (1 + gain L), whose poles are those zeros
+    inverse = low_pass.A - sensor.gain / (1.0 + sensor.gain * low_pass.direct) * np.outer(
+        low_pass.input, low_pass.output
+    )
     return [complex(root) for root in np.linalg.eigvals(inverse)]
 
 
 def _section_and_factors(form: PoleZeroForm, delay: int) -> tuple[Floats, Filter]:
-    """Poles and zeros two by two: the section (9,) takes the slowest poles, and a single zero if their number is
-    odd. A delay that stands apart is taken back by zeros."""
+    """Poles and zeros two by two: the section (9,), columns of `Sections.rows`, takes the slowest poles, the gain,
+    and a single zero if their number is odd; the filter the others. A delay that stands apart is taken back by
+    zeros."""
     poles, zeros = form.poles, np.append(form.zeros, np.full(delay, -1.0))
     if len(poles) % 2:  # a pole and a zero at z = 0, which change nothing
         poles, zeros = np.append(poles, -1.0), np.append(zeros, -1.0)
@@ -468,6 +482,7 @@ def _section_and_factors(form: PoleZeroForm, delay: int) -> tuple[Floats, Filter
     above = _quadratics(zeros[: len(zeros) - len(single)])
     slowest = below.pop(int(np.argmin([abs(c0) for _, _, c0 in below])))
     top = [1.0, -single[0]] if len(single) else [0.0, 1.0]
+    # d1, d0, n2 = 0, n1, n0, no old force, not chained
     row = np.array([*slowest[1:], 0.0, form.gain * top[0], form.gain * top[1], 0.0, 0.0, 0.0, 0.0])
     # each pair of zeros with the pair of poles whose size is nearest in order
     below.sort(key=lambda quadratic: -abs(quadratic[2]))
@@ -478,6 +493,6 @@ def _section_and_factors(form: PoleZeroForm, delay: int) -> tuple[Floats, Filter
 
 
 def _quadratics(roots: Complexes) -> list[list[float]]:
-    """Monic quadratics c2, c1, c0 of roots that stand in pairs, conjugates or both real."""
+    """Monic quadratics c2, c1, c0, one for each two roots in a row, which are conjugates or both real."""
     first, second = roots[0::2], roots[1::2]
     return [[1.0, float(-(a + b).real), float((a * b).real)] for a, b in zip(first, second, strict=True)]

@@ -191,7 +191,7 @@ FixedFeedback = ForceSensor | Feedforward | LocalLoop
 
 
 def acts(feedback: FixedFeedback | None) -> bool:
-    """Whether a feedback changes the linear loop at all; for designs, whether that of any of them does."""
+    """Whether a feedback changes the linear loop, one of its gains not 0; of designs, whether that of any does."""
     match feedback:
         case ForceSensor():
             return bool(np.any(feedback.gain))
@@ -204,7 +204,7 @@ def acts(feedback: FixedFeedback | None) -> bool:
 
 
 def feedback_name(feedback: FixedFeedback) -> str:
-    """A feedback in words, without numbers whose units hang on what is rendered."""
+    """A feedback in words, without numbers whose units depend on whether forces or moments are rendered."""
     match feedback:
         case ForceSensor():
             return describe_feedback(feedback)
@@ -223,7 +223,7 @@ def describe_feedback(feedback: FixedFeedback, moments: bool = False) -> str:
     match feedback:
         case ForceSensor():
             law = " on the force error" if feedback.law == "force-error" else ""
-            return f"force feedback{law} (gain {_text(feedback.gain)})"
+            return f"force feedback{law} (gain {_number_text(feedback.gain)})"
         case Feedforward():
             parts = [
                 (feedback.inertia, f"{{}} {mass}"),
@@ -231,37 +231,42 @@ def describe_feedback(feedback: FixedFeedback, moments: bool = False) -> str:
                 (feedback.damping, f"{{}} {damping}"),
                 (feedback.coulomb, f"{{}} {force} of dry friction"),
             ]
-            given = [text.format(_text(number)) for number, text in parts if np.any(number)]
+            given = [text.format(_number_text(number)) for number, text in parts if np.any(number)]
             return f"feedforward of {', '.join(given) or 'nothing'}"
         case LocalLoop():
             parts = [(feedback.stiffness, f"{{}} {stiffness}"), (feedback.damping, f"{{}} {damping}")]
-            given = [text.format(_text(number)) for number, text in parts if np.any(number)]
+            given = [text.format(_number_text(number)) for number, text in parts if np.any(number)]
             return (
                 f"a local loop at {feedback.rate_multiple} times the rate ({', '.join(given) or 'without gains'})"
             )
 
 
-def _text(number: Number) -> str:
+def _number_text(number: Number) -> str:
+    """A number to six digits; "several" for those of designs."""
     return "several" if np.ndim(number) else f"{number:.6g}"
 
 
 def low_passes(feedback: FixedFeedback | None) -> Iterator[tuple[str, LowPass | None]]:
-    """The low passes of a feedback, each with the name of its argument."""
+    """The arguments of a feedback that take a low pass: name, and the low pass or None for none; nothing of
+    None."""
     names = ("filter", "velocity_filter", "acceleration_filter")
     yield from ((name, getattr(feedback, name)) for name in names if hasattr(feedback, name))
 
 
 def _check_count(name: str, value: object, least: int, most: int = 100) -> None:
+    """Raise ValueError for anything but a whole number from `least` to `most`; True and False are none."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or not least <= value <= most:
         raise ValueError(f"{name} must be a whole number from {least} to {most}, got {describe_value(value)}")
 
 
 def _check_estimate(method: object) -> None:
+    """Raise TypeError for anything but a linear velocity estimate."""
     if not isinstance(method, LinearMethod):
         raise wrong_type("velocity", "a linear estimate such as WindowedDifference(4)", method)
 
 
 def _check_filter(name: str, low_pass: object) -> None:
+    """Raise TypeError, which `name` begins, for anything but a low pass or None."""
     if not isinstance(low_pass, FirstOrder | Butterworth | None):
         raise wrong_type(name, "a FirstOrder, a Butterworth or None", low_pass)
 
@@ -270,7 +275,7 @@ ROUNDING: Final = 1e-12  # samples by which a delay may fall short of a whole nu
 
 
 def whole_samples(delay: Floats) -> Ints:
-    """Whole samples of delays (...), as `Controller.whole_delay` of one."""
+    """Whole samples (...) of delays (...) [samples], each as `Controller.whole_delay`."""
     return np.floor(delay + ROUNDING).astype(np.int64)
 
 
@@ -395,7 +400,7 @@ class Controller:
 
     @property
     def wall_alone(self) -> Controller:
-        """The computer with nothing beside the wall law."""
+        """The computer without force sensor, feedforward and local loop: itself where it has none of them."""
         if self.force_sensor is None and self.feedforward is None and self.local_loop is None:
             return self
         return replace(self, force_sensor=None, feedforward=None, local_loop=None)
@@ -405,7 +410,7 @@ def check_no_feedback(controller: Controller, what: str, instead: str) -> None:
     """Raise FeedbackError for a computer with feedback beside the wall law, Coulomb feedforward included.
 
     what     the answer, such as "limit cycles are not predicted"
-    instead  what to do, such as "simulate"
+    instead  what the user can do, such as "simulate"
     """
     names = controller.feedback_names if controller.fixed_feedback or controller.feeds_friction else ()
     if names:

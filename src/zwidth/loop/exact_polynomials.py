@@ -33,20 +33,20 @@ SETTLED: Final = 2e-16  # share of a root by which its last step moves it
 def characteristic_polynomial(E: Floats) -> Polynomial:
     """det(d - E), monic, of a matrix (n, n)."""
     with localcontext(ARITHMETIC):
-        return _determinant(_decimals(E))
+        return _determinant(_decimal_rows(E))
 
 
 def numerator(E: Floats, g: Floats, c: Floats, below: Polynomial) -> Polynomial:
-    """c adj(d - E) g, without leading coefficients that are 0.
+    """c adj(d - E) g, numerator of c (d - E)^-1 g, without leading coefficients that are 0.
 
-    g, c   (n,)
-    below  `characteristic_polynomial` of E
+    E      (n, n);   g, c   (n,)
+    below  its denominator, `characteristic_polynomial` of E
     """
     with localcontext(ARITHMETIC):
         force, reading = (list(map(Decimal, each.tolist())) for each in (g, c))
         rows = [
             [value - push * read for value, read in zip(row, reading, strict=True)]
-            for row, push in zip(_decimals(E), force, strict=True)
+            for row, push in zip(_decimal_rows(E), force, strict=True)
         ]
         top = [a - b for a, b in zip(_determinant(rows), below, strict=True)]
         least = NOTHING * max(map(abs, below))
@@ -56,14 +56,14 @@ def numerator(E: Floats, g: Floats, c: Floats, below: Polynomial) -> Polynomial:
 
 
 def without_roots(p: Polynomial, root: int) -> tuple[Polynomial, int]:
-    """A polynomial divided by (d - root) as often as that leaves no rest; and how often that is."""
+    """A polynomial divided by (d - root) as often as that leaves no remainder, and how often that is."""
     with localcontext(ARITHMETIC):
         count = 0
         while len(p) > 1:
-            quotient, rest = [Decimal(0)] * (len(p) - 1), p[-1]
-            for k in range(len(p) - 2, -1, -1):
-                quotient[k], rest = rest, p[k] + root * rest
-            if abs(rest) > NOTHING * max(map(abs, p)):
+            quotient, remainder = [Decimal(0)] * (len(p) - 1), p[-1]
+            for k in range(len(p) - 2, -1, -1):  # Horner's rule
+                quotient[k], remainder = remainder, p[k] + root * remainder
+            if abs(remainder) > NOTHING * max(map(abs, p)):
                 break
             p, count = quotient, count + 1
         return p, count
@@ -80,7 +80,7 @@ def roots_near(p: Polynomial, starts: Complexes) -> Complexes | None:
         for _ in range(SWEEPS):
             for k in np.flatnonzero(moving):
                 newton = _newton_step(p, complex(at[k]))
-                apart = np.delete(at[k] - at, k)
+                apart = np.delete(at[k] - at, k)  # the other roots are divided out of p by these distances
                 step = newton / (1.0 - newton * np.sum(1.0 / apart))
                 if not np.isfinite(step):
                     return None
@@ -112,7 +112,7 @@ def refined_root(p: Polynomial, start: complex) -> tuple[Decimal, Decimal] | Non
 
 
 def decimals(values: Floats) -> list[Decimal]:
-    """Exact decimal values of doubles (k,)."""
+    """Doubles (k,) as decimal numbers of the same value."""
     return list(map(Decimal, values.tolist()))
 
 
@@ -121,12 +121,13 @@ def exact_dot(first: Sequence[Decimal], second: Sequence[Decimal]) -> Decimal:
     return sum((a * b for a, b in zip(first, second, strict=True)), Decimal(0))
 
 
-def _decimals(E: Floats) -> list[list[Decimal]]:
+def _decimal_rows(E: Floats) -> list[list[Decimal]]:
+    """Rows of a matrix as `decimals`."""
     return [decimals(row) for row in E]
 
 
 def _newton_step(p: Polynomial, z: complex) -> complex:
-    """Newton's step p(z) / p'(z) of a polynomial at z."""
+    """Newton's step p(z) / p'(z) of a polynomial at z; nan where p' is 0."""
     (re, im), (slope_re, slope_im) = _value_and_slope(p, Decimal(z.real), Decimal(z.imag))
     size = slope_re * slope_re + slope_im * slope_im
     if not size:
@@ -135,7 +136,7 @@ def _newton_step(p: Polynomial, z: complex) -> complex:
 
 
 def _value_and_slope(p: Polynomial, x: Decimal, y: Decimal) -> tuple[tuple[Decimal, Decimal], ...]:
-    """p and p' at x + i y, real and imaginary part of each."""
+    """p and p' at x + i y: (real, imaginary) part of p, then of p'."""
     re = im = slope_re = slope_im = Decimal(0)
     for coefficient in reversed(p):
         slope_re, slope_im = slope_re * x - slope_im * y + re, slope_re * y + slope_im * x + im
@@ -144,16 +145,17 @@ def _value_and_slope(p: Polynomial, x: Decimal, y: Decimal) -> tuple[tuple[Decim
 
 
 def _determinant(H: list[list[Decimal]]) -> Polynomial:
-    """det(d - H) of a matrix, which is overwritten."""
+    """det(d - H) of a matrix given by its rows, which is overwritten."""
     n = len(H)
     _to_hessenberg(H)
+    # minors[k]: det(d - H) of the first k rows and columns, by expansion along the last of them
     minors: list[Polynomial] = [[Decimal(1)]]
     for k in range(1, n + 1):
         before = minors[k - 1]
         p = [Decimal(0), *before]
         for j, value in enumerate(before):
             p[j] -= H[k - 1][k - 1] * value
-        below = Decimal(1)
+        below = Decimal(1)  # product of the subdiagonal entries on the way
         for i in range(1, k):
             below *= H[k - i][k - i - 1]
             factor = below * H[k - i - 1][k - 1]
@@ -165,9 +167,11 @@ def _determinant(H: list[list[Decimal]]) -> Polynomial:
 
 
 def _to_hessenberg(H: list[list[Decimal]]) -> None:
-    """Make all entries below the first subdiagonal 0 by elimination with pivots, a similarity."""
+    """Make all entries of a matrix H below the first subdiagonal 0, in place, by elimination with pivots, a
+    similarity that keeps det(d - H)."""
     n = len(H)
     for m in range(1, n - 1):
+        # column m - 1 is cleared below row m: rows are subtracted, the inverse step adds columns
         pivot = max(range(m, n), key=lambda i: abs(H[i][m - 1]))
         if not H[pivot][m - 1]:
             continue
@@ -179,9 +183,9 @@ def _to_hessenberg(H: list[list[Decimal]]) -> None:
             if not H[i][m - 1]:
                 continue
             share = H[i][m - 1] / H[m][m - 1]
-            own, other = H[i], H[m]
-            own[m - 1] = Decimal(0)
+            cleared, pivot_row = H[i], H[m]
+            cleared[m - 1] = Decimal(0)
             for j in range(m, n):
-                own[j] -= share * other[j]
+                cleared[j] -= share * pivot_row[j]
             for row in H:
                 row[m] += share * row[i]

@@ -21,38 +21,41 @@ def factor_response(numerator: Floats, denominator: Floats, d: Complexes) -> Com
 
 
 def window_response(window: Floats, z: Complexes) -> Complexes:
-    """sum_k window_k z^-k at complex z (...)."""
+    """sum_k window_k z^-k (...) at complex z (...)."""
     return np.asarray(np.polyval(window[::-1], 1.0 / z), dtype=complex)
 
 
 def rows_response(rows: Floats, split: bool, z: Complexes, z_minus_1: Complexes | None = None) -> Complexes:
     """Response (...) of plant sections (`loop.sections`) at complex z (...), without force path and whole delay.
 
-    z_minus_1  (...)  z - 1, where it is known to more digits than the difference has
+    rows       (m, 9)  `Sections.rows`
+    split      whether the old force acts, too
+    z_minus_1  (...)   z - 1, where it is known to more digits than the difference has
     """
     d = z - 1.0 if z_minus_1 is None else z_minus_1
     out, over = np.zeros_like(d), np.ones_like(d)
-    for row in rows:
-        quadratic = (d + row[0]) * d + row[1]
-        over = over / quadratic if row[8] else 1.0 / quadratic
-        top = (row[2] * d + row[3]) * d + row[4]
+    for d1, d0, n2, n1, n0, o2, o1, o0, chained in rows:
+        quadratic = (d + d1) * d + d0
+        over = over / quadratic if chained else 1.0 / quadratic
+        top = (n2 * d + n1) * d + n0
         if split:
-            top += ((row[5] * d + row[6]) * d + row[7]) / z
+            top += ((o2 * d + o1) * d + o0) / z
         out += top * over
     return out
 
 
 def feedforward_response(ahead: Feedforward, period: float, z: Complexes, d: Complexes) -> Complexes:
     """C(z) (...), force commanded per reading [N/m], at z (...) with d = z - 1."""
-    own = ahead.velocity.estimator(period)
-    velocity = factor_response(own.numerator, own.denominator, d) * window_response(own.window, z)
+    estimate = ahead.velocity.estimator(period)
+    velocity = factor_response(estimate.numerator, estimate.denominator, d) * window_response(estimate.window, z)
     velocity = velocity * low_pass_response(ahead.velocity_filter, period, d)
     acceleration = d / (z * period) * low_pass_response(ahead.acceleration_filter, period, d)
     return np.asarray(velocity * (ahead.damping + ahead.inertia * acceleration))
 
 
 def sensor_response(sensor: ForceSensor, period: float, d: Complexes) -> Complexes:
-    """Force commanded per force that reaches the sensor's filter (...), without the sensor's delay."""
+    """Force commanded per force that reaches the sensor's filter (...), at d = z - 1 (...), without the sensor's
+    delay."""
     return np.asarray(sensor.gain * low_pass_response(sensor.filter, period, d))
 
 

@@ -22,7 +22,8 @@ from zwidth.compiled import compiled, compiled_lean
 
 @compiled_lean
 def step_response(decay: float, squared: float, time: float) -> tuple[float, float]:
-    """Position and velocity after a unit force has acted for `time` on xi'' + 2 a xi' + w^2 xi = 1, from rest.
+    """Position and velocity after a unit force has acted for `time` on xi'' + 2 a xi' + w^2 xi = 1, from rest;
+    decay is a [1/s], squared w^2 [1/s^2].
 
         g(t) = t^2 exp[0, s1 t, s2 t],    g'(t) = t exp[s1 t, s2 t]       (divided differences of exp)
 
@@ -42,6 +43,7 @@ def step_response(decay: float, squared: float, time: float) -> tuple[float, flo
     else:
         velocity = exp(mean)
     if abs(total) + abs(product) <= 1.0:
+        # g/t^2 = sum_k h_k / (k + 2)!, with h_k = total h_{k-1} - product h_{k-2} of the roots' powers
         term, previous, weight, position = 1.0, 0.0, 2.0, 0.5
         for k in range(1, 40):
             term, previous = total * term - product * previous, term
@@ -55,6 +57,7 @@ def step_response(decay: float, squared: float, time: float) -> tuple[float, flo
         position = (1.0 - exp(mean) * shape) / product
     else:
         root = sqrt(-gap)
+        # both roots are real; g/t^2 = (exp[s1, s2] - exp[0, s2]) / s1 with the larger one as s1
         large = mean - root if mean <= 0.0 else mean + root
         small = product / large
         position = (velocity - (expm1(small) / small if small != 0.0 else 1.0)) / large
@@ -70,7 +73,8 @@ def lag_share(period: float, lag: float) -> float:
 
 @compiled_lean
 def denominator(decay: float, squared: float, period: float) -> tuple[float, float]:
-    """d1, d0 of a mode's sampled poles, d = z - 1."""
+    """d1, d0 of d^2 + d1 d + d0, whose roots are a mode's sampled poles less 1, exp(s T) - 1; decay a, squared
+    w^2."""
     a, T = decay, period
     gap = squared - a * a
     if gap > 0.0:
@@ -95,10 +99,13 @@ Pair = tuple[float, float]
 def held_row(
     decay: float, squared: float, position: float, velocity: float, period: float, fraction: float
 ) -> Row:
-    """One second-order mode xi'' + 2 a xi' + w^2 xi = f as a row, without actuator lag.
+    """One second-order mode xi'' + 2 a xi' + w^2 xi = f as a row d1, d0, n2, n1, n0, o2, o1, o0, without lag.
 
+    decay, squared      a [1/s], w^2 [1/s^2]
     position, velocity  its share in the reading: position xi + velocity xi'
+    fraction            of the period, in which the old force still acts
     """
+    # the new force acts in the rest of the interval; what it lacks of a whole one is the old force's
     d1, d0 = denominator(decay, squared, period)
     step = step_response(decay, squared, period)
     new1, new0 = _numerator(
@@ -134,7 +141,7 @@ def lagged_row(
     """One second-order mode, whose force lags, as a row in front of the factor 1/(d + s); arguments of `held_row`.
 
     With P the mode's state after T from a unit lagged force without command, Q from a unit command from rest, and
-    Q_new from one that has acted for the rest of the interval only:
+    Q_new from one that has acted for the rest of the interval only, in all of it s = 1 - exp(-T/lag):
 
         (d + s) y = c Q + c (d - E)^-1 [ s P + (s + E) Q ]
     """
@@ -144,13 +151,14 @@ def lagged_row(
         n1, n0, o1, o0 = row[3], row[4], row[6], row[7]
         return d1, d0, n1, n1 + n0, n0, o1, o1 + o0, o0
     g, dg = step_response(decay, squared, period)
-    p, whole = lagged_responses(decay, squared, period, lag)
-    _, new = lagged_responses(decay, squared, (1.0 - fraction) * period, lag)
-    late, late_new = -expm1(-period / lag), -expm1(-(1.0 - fraction) * period / lag)
-    n2, n1, n0 = _lagged_numerator(decay, squared, (g, dg), p, new, late, late_new, position, velocity)
-    a2, a1, a0 = _lagged_numerator(decay, squared, (g, dg), p, whole, late, late, position, velocity)
-    n1, n0, a1, a0 = n1 + n2 * d1, n0 + n2 * d0, a1 + a2 * d1, a0 + a2 * d0
-    return d1, d0, n2, n1, n0, a2 - n2, a1 - n1, a0 - n0
+    P, Q = lagged_responses(decay, squared, period, lag)
+    _, Q_new = lagged_responses(decay, squared, (1.0 - fraction) * period, lag)
+    s, s_new = -expm1(-period / lag), -expm1(-(1.0 - fraction) * period / lag)
+    n2, n1, n0 = _lagged_numerator(decay, squared, (g, dg), P, Q_new, s, s_new, position, velocity)
+    all2, all1, all0 = _lagged_numerator(decay, squared, (g, dg), P, Q, s, s, position, velocity)
+    # c Q over the common denominator d^2 + d1 d + d0; the old force has what the new one lacks of both
+    n1, n0, all1, all0 = n1 + n2 * d1, n0 + n2 * d0, all1 + all2 * d1, all0 + all2 * d0
+    return d1, d0, n2, n1, n0, all2 - n2, all1 - n1, all0 - n0
 
 
 @compiled_lean
@@ -158,20 +166,23 @@ def _lagged_numerator(
     decay: float,
     squared: float,
     step: Pair,
-    p: Pair,
-    q: Pair,
-    late: float,
-    late_q: float,
+    P: Pair,
+    Q: Pair,
+    s: float,
+    s_Q: float,
     position: float,
     velocity: float,
 ) -> tuple[float, float, float]:
-    """c q, and the coefficients of d and 1 of  c adj(d - E) [ late_q P + (late + E) q ]."""
+    """c Q, and the coefficients of d and 1 of  c adj(d - E) [ s_Q P + (s + E) Q ], with the names of `lagged_row`.
+
+    step  as of `_numerator`;   s, s_Q  `lag_share` of a whole interval, and of the time for which Q's command acts
+    """
     g, dg = step
-    x, v = q
+    x, v = Q
     back = 2.0 * decay * dg + squared * g
     moved = (
-        late_q * p[0] + late * x - squared * g * x + dg * v,
-        late_q * p[1] + late * v - squared * dg * x - back * v,
+        s_Q * P[0] + s * x - squared * g * x + dg * v,
+        s_Q * P[1] + s * v - squared * dg * x - back * v,
     )
     n1, n0 = _numerator(decay, squared, step, moved, position, velocity)
     return position * x + velocity * v, n1, n0
@@ -179,7 +190,7 @@ def _lagged_numerator(
 
 @compiled_lean
 def lagged_responses(decay: float, squared: float, time: float, lag: float) -> tuple[Pair, Pair]:
-    """Position and velocity of a mode after `time`: from a unit lagged force without command, and from rest under
+    """(Position, velocity) of a mode after `time`: from a unit lagged force without command, and from rest under
     a unit command through the lag.
 
     The exponential of [position, velocity t, force, command] over times in units of t, by Taylor's series for a
@@ -193,12 +204,12 @@ def lagged_responses(decay: float, squared: float, time: float, lag: float) -> t
     while size > 0.5:
         size *= 0.5
         halvings += 1
-    h = 0.5**halvings
-    # columns of the force (f) and the command (c), and of the mode's own two states (x, v): rows x, v, f
+    part = 0.5**halvings
+    # X by column, of the force (f), the command (c) and the mode's own two states (x, v): xf is row x of column f
     xf, vf, ff, xc, vc, fc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, vx, xv, vv = 0.0, 0.0, 0.0, 0.0
     for k in range(16, 0, -1):  # Horner's rule for 1 + M/1 (1 + M/2 (1 + ...)), less the first 1
-        s = h / k
+        s = part / k
         xf, vf, ff = s * vf, s * (-w * xf - a * vf + 1.0 + ff), -s * rate * (1.0 + ff)
         xc, vc, fc = s * vc, s * (-w * xc - a * vc + fc), s * rate * (1.0 - fc)
         xx, vx = s * vx, s * (-w * (1.0 + xx) - a * vx)
@@ -224,7 +235,10 @@ def lagged_responses(decay: float, squared: float, time: float, lag: float) -> t
 
 
 def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
-    """One mode that the reading counts once as a row (8,) d1, d0, n2, n1, n0, o2, o1, o0, with or without lag."""
+    """One mode as a row (8,) d1, d0, n2, n1, n0, o2, o1, o0, with or without lag; the reading is its xi.
+
+    decay, squared, fraction  as of `held_row`;   lag  tau [s], 0: none
+    """
     row = np.empty(8)
     _fill_row(decay, squared, period, fraction, lag, row)
     return row
@@ -245,7 +259,7 @@ def mode_growth(
     decay: float, squared: float, rate: float, time: float, lag: float
 ) -> tuple[Floats, Floats, Floats]:
     """A mode on its states [xi, xi'/rate] over a time: growth exp(A t) - 1 (2, 2), and the states (2,) that a unit
-    lagged force without command leaves, and a unit command from rest."""
+    lagged force without command leaves, and a unit command from rest. rate [1/s] only scales the velocity."""
     out = np.empty(6)
     _fill_growth(decay, squared, time, lag, out)
     g, dg = out[:2]
@@ -257,7 +271,8 @@ def mode_growth(
 
 @compiled
 def _fill_growth(decay: float, squared: float, time: float, lag: float, out: Floats) -> None:
-    """Fill in `out` (6,): step response, then both of `lagged_responses`, (0, 0) and the first without lag."""
+    """Fill in `out` (6,), three positions each with its velocity: `step_response`, then both of
+    `lagged_responses`; without lag 0 and the step response again."""
     out[0], out[1] = step_response(decay, squared, time)
     if lag > 0.0:
         (out[2], out[3]), (out[4], out[5]) = lagged_responses(decay, squared, time, lag)

@@ -298,13 +298,13 @@ def _poles(plant: Plant, period: float) -> Complexes:
 
 
 def _section_poles(denominators: Floats) -> Complexes:
-    """Roots e of e^2 + d1 e + d0 for each row d1, d0."""
+    """Roots (2 m,) e of e^2 + d1 e + d0 for each of m rows d1, d0."""
     roots = [np.roots([1.0, *row]) for row in denominators]
     return np.concatenate([np.zeros(0, dtype=complex), *roots])
 
 
 def _unstable_count(e: Complexes) -> int:
-    """Number of poles z = 1 + e outside the unit circle."""
+    """Number of poles z = 1 + e outside the unit circle, by |z|^2 - 1 = 2 Re e + |e|^2."""
     return int(np.sum(2.0 * e.real + np.abs(e) ** 2 > GROWS))
 
 
@@ -313,7 +313,7 @@ NEUTRAL: Final = 1e-12  # |z| - 1 that is rounding
 
 @dataclass(frozen=True)
 class SidewaysMotion(Documented):
-    """A motion that stands apart.
+    """A motion along the wall's surface, which no wall moves without load, as it is under load.
 
     growth_rate  [1/s], negative where it decays, 0 where it does neither;   frequency [Hz], 0 without vibration
     """
@@ -324,7 +324,7 @@ class SidewaysMotion(Documented):
     @property
     @documented("s", value=finite, before="frequency")
     def time_to_double(self) -> float:
-        """[s]; inf of a motion that does not grow."""
+        """Time in which the motion grows to twice its size [s]; inf of one that does not grow."""
         return log(2.0) / self.growth_rate if self.growth_rate > 0.0 else np.inf
 
     @property
@@ -355,10 +355,10 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
     vibrates = np.abs(d[order].imag) > 0.0
     motions, pair = [], False
     for rate, frequency, complex_root in zip(rates.tolist(), frequencies.tolist(), vibrates.tolist(), strict=True):
-        pair = complex_root and not pair
+        pair = complex_root and not pair  # the first of two conjugates, which stand for one motion
         if not complex_root or pair:
             motions.append(SidewaysMotion(rate, frequency if complex_root else 0.0))
-    free = 0 if plant.without_load is None else len(_squared(plant.without_load)[0])
+    free = 0 if plant.without_load is None else len(_free_and_held(plant.without_load)[0])
     return tuple(motion for i, motion in enumerate(motions[: plant.size]) if i < free or motion.growth_rate > 0.0)
 
 
@@ -366,13 +366,13 @@ def held_motions(plant: Plant) -> tuple[str, ...]:
     """Names of the motions that stand apart and are held by springs, as they are without load."""
     if plant.without_load is None:
         return ()
-    squared, decay = _squared(plant.without_load)[1:]
+    squared, decay = _free_and_held(plant.without_load)[1:]
     return tuple(motion_name(float(w2), float(a)) for w2, a in zip(squared, decay, strict=True))
 
 
-def _squared(plant: Plant) -> tuple[Floats, Floats, Floats]:
-    """Squared frequencies of the free motions of a plant, and of the others with how they decay, dampers that
-    couple them left out [1/s²], [1/s]."""
+def _free_and_held(plant: Plant) -> tuple[Floats, Floats, Floats]:
+    """Squared frequencies (all 0) of the free motions of a plant; squared frequencies of the motions that springs
+    hold [1/s²], and their decay [1/s], dampers that couple them left out."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     decay = 0.5 * np.einsum("ik,ij,jk->k", shapes, plant.damping, shapes)
     free = squared == 0.0

@@ -54,7 +54,8 @@ NO_FILTER = Filter(np.zeros((0, 3)), np.zeros((0, 3)))
 
 
 def first_order_factors(low_pass: FirstOrder, period: float) -> tuple[Rows, Rows]:
-    """Backward Euler of 1/(tau s + 1):  (1 - a) z / (z - a),  a = tau / (tau + T)."""
+    """Backward Euler of 1/(tau s + 1):  (1 - a) z / (z - a),  a = tau / (tau + T); its numerator's row, then its
+    denominator's, with the share 1 - a in place of a."""
     share = period / (low_pass.time_constant + period)
     return [[0.0, share, share]], [[0.0, 1.0, share]]
 
@@ -65,6 +66,8 @@ def butterworth_factors(low_pass: Butterworth, period: float) -> tuple[Rows, Row
     With u = w_c T / 2 (prewarped: tan of it) a pair of analog poles of damping ratio q becomes
 
         u^2 (d + 2)^2 / [ (1 + 2 q u + u^2) d^2 + (4 q u + 4 u^2) d + 4 u^2 ]
+
+    Returns rows of numerators and of denominators; an odd order has one factor of first order, u (d + 2) / [...].
     """
     u = np.pi * low_pass.cutoff_Hz * period
     if low_pass.discretisation == "tustin-prewarped":
@@ -84,7 +87,7 @@ def butterworth_factors(low_pass: Butterworth, period: float) -> tuple[Rows, Row
 
 
 def low_pass_factors(low_pass: FirstOrder | Butterworth | None, period: float) -> tuple[Rows, Rows]:
-    """Numerator and denominator factors of a low pass; two empty lists for None."""
+    """Rows c2, c1, c0 of a low pass, of its numerators and of its denominators; two empty lists for None."""
     match low_pass:
         case FirstOrder():
             return first_order_factors(low_pass, period)
@@ -142,7 +145,7 @@ def force_path(controller: Controller) -> Filter:
 
 
 def velocity_estimator(controller: Controller) -> Estimator:
-    """The controller's velocity estimate through its velocity filter."""
+    """The controller's velocity estimate and, behind it, its velocity filter, as one estimator."""
     estimate = controller.velocity.estimator(controller.sampling_period)
     top, bottom = low_pass_factors(controller.velocity_filter, controller.sampling_period)
     return Estimator(
@@ -180,7 +183,7 @@ class LoopTable(NamedTuple):
 
 
 def table_of_loops(*loops: Loop) -> LoopTable:
-    """Loops of any kinds, each with its own computer. Raises what `Loop.table` raises."""
+    """One table of loops of any kinds, loop i with computer i. Raises what `Loop.table` raises."""
     each = [loop.table for loop in loops]
     count = np.array([len(table.rows[0]) for table in each], dtype=np.int64)
     rows = np.zeros((len(each), count.max(), 9))
@@ -230,13 +233,14 @@ class ComputerColumns(NamedTuple):
 def computer_columns(controller: Controller) -> ComputerColumns:
     """The columns of a controller; those of one without designs are kept for its next loop."""
     try:
-        return _kept_columns(controller)
+        return _cached_columns(controller)
     except TypeError:  # numbers of several designs have no hash
         return _columns(controller)
 
 
 @lru_cache(maxsize=64)
-def _kept_columns(controller: Controller) -> ComputerColumns:
+def _cached_columns(controller: Controller) -> ComputerColumns:
+    """`_columns` of the last 64 controllers without designs."""
     return _columns(controller)
 
 
@@ -327,7 +331,7 @@ def factor_memory(loops: LoopTable) -> CircleFactors:
 
 
 def circle_factors(loops: LoopTable, radius: float = 1.0) -> CircleFactors:
-    """The factors of the first of these loops."""
+    """The factors of the first of these loops on the circle |z| = radius."""
     out = factor_memory(loops)
     fill_first(loops, radius, out)
     return out
@@ -335,14 +339,16 @@ def circle_factors(loops: LoopTable, radius: float = 1.0) -> CircleFactors:
 
 @compiled
 def fill_first(loops: LoopTable, radius: float, out: CircleFactors) -> None:
-    """The factors of loop 0."""
+    """Fill in the factors of loop 0."""
     fill_computer(loops, 0, radius, out)
     fill_plant(loops, 0, out)
 
 
 @compiled_lean
 def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: Floats) -> None:
-    """(1 - s)^degree (c2 d^2 + c1 d + c0) in ascending powers of s, degree 1 or 2."""
+    """Fill in `out` (3,), (1 - s)^degree (c2 d^2 + c1 d + c0) in ascending powers of s, degree 1 or 2; with degree
+    1 c2 is 0."""
+    # (1 - s) d = a0 + a1 s
     a0, a1 = radius - 1.0, radius + 1.0
     if degree == 1:
         out[0] = c1 * a0 + c0
@@ -356,8 +362,9 @@ def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: F
 
 @compiled_lean
 def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
-    """The sections of loop i on the circle, and its degree; the computer's factors stand already."""
+    """Fill in the sections of loop i on the circle, and its degree; the computer's factors stand already."""
     radius, m = out.radius[0], loops.section_count[i]
+    # columns of a section's row: d1, d0 of the denominator; n2, n1, n0 of the new force; o2, o1, o0; chained
     for k in range(m):
         bilinear(1.0, loops.rows[i, k, 0], loops.rows[i, k, 1], 2, radius, out.plant[k, 0:3])
         bilinear(loops.rows[i, k, 2], loops.rows[i, k, 3], loops.rows[i, k, 4], 2, radius, out.plant[k, 3:6])
@@ -366,7 +373,7 @@ def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
     # sections have two poles each; the delay, its split and the window add theirs at z = 0
     degree = 2 * m + out.sizes[WHOLE_DELAY] + out.sizes[SPLIT] + out.sizes[WINDOW] - 1
     for k in range(out.sizes[FORCE]):
-        degree += int(out.force[k, 0])
+        degree += int(out.force[k, 0])  # the factor's order
     for k in range(out.sizes[VELOCITY]):
         degree += int(out.velocity[k, 0])
     out.sizes[SECTIONS], out.sizes[DEGREE] = m, degree
@@ -374,7 +381,7 @@ def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
 
 @compiled_lean
 def fill_computer(loops: LoopTable, c: int, radius: float, out: CircleFactors) -> None:
-    """The factors of computer c on the circle |z| = radius."""
+    """Fill in the factors of computer c on the circle |z| = radius."""
     out.radius[0] = radius
     out.sizes[WHOLE_DELAY], out.sizes[SPLIT], out.sizes[COMPUTER] = loops.whole_delay[c], loops.split[c], c
     out.sizes[FORCE], out.sizes[VELOCITY] = loops.force_count[c], loops.velocity_count[c]
@@ -389,7 +396,11 @@ def fill_computer(loops: LoopTable, c: int, radius: float, out: CircleFactors) -
 
 @compiled_lean
 def _fill_factor(factor: Floats, radius: float, out: Floats) -> None:
-    """One factor of a computer, at the order of its denominator."""
+    """Fill in a row (7,) of `CircleFactors.force` or `velocity` from a row (6,) c2, c1, c0, d2, d1, d0 of the
+    table.
+
+    Both polynomials are multiplied by (1 - s) as often as the denominator's order is, which leaves their quotient.
+    """
     degree = 2 if factor[3] != 0.0 else 1
     out[0] = degree
     bilinear(factor[0], factor[1], factor[2], degree, radius, out[1:4])
@@ -418,7 +429,7 @@ def turned(value: complex) -> complex:
 
 @compiled_inline
 def quadratic(a0: float, a1: float, a2: float, cc: float, ss: float, sc: float) -> tuple[complex, complex]:
-    """(a0 + a1 s + a2 s^2) cos^2 on the circle, and its slope by theta."""
+    """(a0 + a1 s + a2 s^2) cos^2 on the circle, and its slope by theta; cc, ss, sc of `half_angle`."""
     return complex(a0 * cc - a2 * ss, a1 * sc), complex(-(a0 + a2) * sc, 0.5 * a1 * (cc - ss))
 
 
@@ -427,7 +438,12 @@ def factor_product(
     rows: Floats, count: int, cc: float, ss: float, sc: float, value: complex, slope: complex
 ) -> tuple[complex, complex, float, float]:
     """A value and its slope by theta times factors n/d, as n conj(d) over |d|^2: numerator and slope, denominator
-    and slope."""
+    and slope, which are real.
+
+    rows        (k, 7)  of `CircleFactors.force` or `velocity`, the first `count` of them: order, n0, n1, n2, d0,
+                d1, d2
+    cc, ss, sc  of `half_angle`
+    """
     bottom, dbottom = 1.0, 0.0
     half = 0.5 * (cc - ss)
     for k in range(count):
@@ -453,20 +469,24 @@ def factor_product(
 
 @compiled_inline
 def minus_inverse_plant(
-    f: CircleFactors, cc: float, ss: float, sc: float
+    factors: CircleFactors, cc: float, ss: float, sc: float
 ) -> tuple[complex, complex, complex, complex]:
-    """-1/P on the circle, delay and force path included: numerator and slope by theta, denominator and slope."""
+    """-1/P on the circle, delay and force path included: numerator and slope by theta, denominator and slope.
+
+    Sections are added over a common denominator: `top` over `bottom` is their sum so far. Columns of `plant` are
+    those of `CircleFactors`; cc, ss, sc of `half_angle`.
+    """
     top, bottom, dtop, dbottom = 0.0 + 0.0j, 1.0 + 0.0j, 0.0 + 0.0j, 0.0 + 0.0j
     # denominators of the sections that a chain is not divided by, times (1 - s)^2 for each that it is
     beside, dbeside = 1.0 + 0.0j, 0.0 + 0.0j
-    u = complex(cc - ss, 2.0 * sc)
-    plant, split, delay = f.plant, f.sizes[SPLIT], f.sizes[WHOLE_DELAY]
-    for k in range(f.sizes[SECTIONS]):
+    u = complex(cc - ss, 2.0 * sc)  # exp(i theta), whose slope is i u
+    plant, split, delay = factors.plant, factors.sizes[SPLIT], factors.sizes[WHOLE_DELAY]
+    for k in range(factors.sizes[SECTIONS]):
         den, dden = quadratic(plant[k, 0], plant[k, 1], plant[k, 2], cc, ss, sc)
         num, dnum = quadratic(plant[k, 3], plant[k, 4], plant[k, 5], cc, ss, sc)
         if split:
             old, dold = quadratic(plant[k, 6], plant[k, 7], plant[k, 8], cc, ss, sc)
-            back = scaled_factors(u.conjugate(), 1.0 / f.radius[0])
+            back = scaled_factors(u.conjugate(), 1.0 / factors.radius[0])
             num, dnum = num + old * back, dnum + (dold - turned(old)) * back
         if plant[k, 9] != 0.0:
             dbeside = (dbeside - turned(beside)) * u.conjugate()
@@ -478,35 +498,39 @@ def minus_inverse_plant(
         dbottom = dbottom * den + bottom * dden
         bottom = bottom * den
     bottom, dbottom = -bottom, -dbottom
-    top, dtop, size, dsize = factor_product(f.force, f.sizes[FORCE], cc, ss, sc, top, dtop)
+    top, dtop, size, dsize = factor_product(factors.force, factors.sizes[FORCE], cc, ss, sc, top, dtop)
     for _ in range(delay):
-        dbottom = scaled_factors((dbottom + turned(bottom)) * u, f.radius[0])
-        bottom = scaled_factors(bottom * u, f.radius[0])
+        dbottom = scaled_factors((dbottom + turned(bottom)) * u, factors.radius[0])
+        bottom = scaled_factors(bottom * u, factors.radius[0])
     return scaled_factors(bottom, size), scaled_factors(dbottom, size) + scaled_factors(bottom, dsize), top, dtop
 
 
 @compiled_inline
-def velocity_on_circle(f: CircleFactors, cc: float, ss: float, sc: float) -> tuple[complex, complex, float, float]:
-    """w on the circle: numerator and slope by theta, denominator and slope, which are real."""
-    window = f.window
-    n = f.sizes[WINDOW]
+def velocity_on_circle(
+    factors: CircleFactors, cc: float, ss: float, sc: float
+) -> tuple[complex, complex, float, float]:
+    """w on the circle: numerator and slope by theta, denominator and slope, which are real; cc, ss, sc of
+    `half_angle`."""
+    window = factors.window
+    n = factors.sizes[WINDOW]
     value, slope = complex(window[n - 1], 0.0), 0.0 + 0.0j
     if n > 1:
-        # Horner's scheme in 1/z, oldest sample first
-        back = scaled_factors(complex(cc - ss, -2.0 * sc), 1.0 / f.radius[0])
+        # Horner's scheme in 1/z, oldest sample first; the slope by 1/z times -i/z is that by theta
+        back = scaled_factors(complex(cc - ss, -2.0 * sc), 1.0 / factors.radius[0])
         for k in range(n - 2, -1, -1):
             slope = slope * back + value
             value = value * back + complex(window[k], 0.0)
         slope = -turned(slope * back)
-    return factor_product(f.velocity, f.sizes[VELOCITY], cc, ss, sc, value, slope)
+    return factor_product(factors.velocity, factors.sizes[VELOCITY], cc, ss, sc, value, slope)
 
 
 @compiled_apart
-def wall_with_slopes(f: CircleFactors, t: float) -> tuple[float, float, float, float]:
+def wall_with_slopes(factors: CircleFactors, t: float) -> tuple[float, float, float, float]:
     """K and B of the wall with a root at rho exp(i theta), t = tan(theta/2), and dK/dtheta, dB/dtheta."""
     cc, ss, sc = half_angle(t)
-    X, dX, N, dN = minus_inverse_plant(f, cc, ss, sc)
-    Y, dY, Q, dQ = velocity_on_circle(f, cc, ss, sc)
+    X, dX, N, dN = minus_inverse_plant(factors, cc, ss, sc)
+    Y, dY, Q, dQ = velocity_on_circle(factors, cc, ss, sc)
+    # -1/P = X/N, w = Y/Q, with a real Q
     inverse = scaled_factors(N.conjugate(), 1.0 / (N.real * N.real + N.imag * N.imag))
     h = X * inverse
     dh = (dX - h * dN) * inverse
@@ -520,11 +544,12 @@ def wall_with_slopes(f: CircleFactors, t: float) -> tuple[float, float, float, f
 
 
 @compiled_apart
-def wall_on_circle(f: CircleFactors, t: float) -> tuple[float, float]:
-    """K and B of `wall_with_slopes`, with a single division."""
+def wall_on_circle(factors: CircleFactors, t: float) -> tuple[float, float]:
+    """K and B of `wall_with_slopes` at t = tan(theta/2), with a single division."""
     cc, ss, sc = half_angle(t)
-    X, _, N, _ = minus_inverse_plant(f, cc, ss, sc)
-    Y, _, Q, _ = velocity_on_circle(f, cc, ss, sc)
+    X, _, N, _ = minus_inverse_plant(factors, cc, ss, sc)
+    Y, _, Q, _ = velocity_on_circle(factors, cc, ss, sc)
+    # h = X/N and w = Y/Q as there, but for |N|^2 and Q, which are divided by at the end
     h = X * N.conjugate()
     over = 1.0 / ((N.real * N.real + N.imag * N.imag) * Y.imag)
     return (h.real * Y.imag - h.imag * Y.real) * over, h.imag * Q * over

@@ -57,22 +57,23 @@ def listed_names(names: Sequence[str]) -> list[str]:
     """
     kinds: dict[tuple[str, str] | None, list[str]] = {}
     for name in names:
-        kinds.setdefault(_kind(name), []).append(name)
+        kinds.setdefault(_noun_and_verb(name), []).append(name)
     many = {kind: each for kind, each in kinds.items() if kind is not None and len(each) > SINGLY}
-    others = group_names([name for name in names if _kind(name) not in many])
-    return [*others, *(_of_many(kind, each) for kind, each in many.items())]
+    others = group_names([name for name in names if _noun_and_verb(name) not in many])
+    return [*others, *(_range_text(kind, each) for kind, each in many.items())]
 
 
-def _kind(name: str) -> tuple[str, str] | None:
-    """Noun and verb of a motion's name, of which many can be told by number and range; None where they cannot."""
+def _noun_and_verb(name: str) -> tuple[str, str] | None:
+    """Noun and verb of a motion's name, the verb "" of a mode, where many of the kind can be told by number and
+    range; None where they cannot."""
     if MODE.match(name):
         return "mode", ""
     match = SIDEWAYS.match(name)
     return None if match is None else (match[1], match[2])
 
 
-def _of_many(kind: tuple[str, str], names: Sequence[str]) -> str:
-    """Name of several motions of a kind: their number and range."""
+def _range_text(kind: tuple[str, str], names: Sequence[str]) -> str:
+    """Name of several motions of a kind, noun and verb as of `_noun_and_verb`: their number and range."""
     noun, verb = kind
     pattern, group = (SIDEWAYS, 3) if verb else (MODE, 1)
     numbers = [float(match[group]) for name in names if (match := pattern.match(name))]

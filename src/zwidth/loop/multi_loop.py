@@ -198,7 +198,8 @@ class MultiLoop:
         return self.estimator.response(z)[0]
 
     def plant_slope(self, z: ArrayLike, d: ArrayLike | None = None) -> tuple[Complexes, Complexes]:
-        """P(z) and dP/dz, (..., m, m); d is z - 1 where that is known to more digits than z has."""
+        """P(z) [m/N] and dP/dz, (..., r, r), along the principal directions, at z (...); d is z - 1 where that is
+        known to more digits than z has."""
         z = np.asarray(z, dtype=complex)
         away = z - 1.0 if d is None else np.asarray(d, dtype=complex)
         held, at = self.sampled_plant, z[..., None, None]
@@ -215,10 +216,12 @@ class MultiLoop:
         return gain * P, gain * dP + dgain * P
 
     def inverse_slope(self, z: Complexes, d: Complexes) -> tuple[Complexes, Complexes]:
-        """P^-1 and its derivative, (..., m, m), without forming P: near z = 1 the 1/d^2 of a free motion
-        hides the others in rounding.
+        """P^-1 [N/m] and its derivative by z, (..., r, r), at z with d = z - 1, without forming P: near z = 1 the
+        1/d^2 of a free motion hides the others in rounding.
 
-        The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y].
+        The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y], G = new + old/z. The slope
+        follows from the same equations, differentiated by z.
+
         Raises LinAlgError where the readings are not independent.
         """
         held, at, m = self.sampled_plant, z[..., None, None], self.count
@@ -256,11 +259,12 @@ class MultiLoop:
 
     @cached_property
     def _whole_affine(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """The matrices of `affine` before what slides unseen is left out."""
+        """The four matrices of `affine` before what slides unseen is left out."""
         held, w, F = self.sampled_plant, self.estimator, self.force_filter
         m, l = self.count, self.whole_delay
         queue = l + (self.fractional_delay > 0.0)
         sizes = np.cumsum([0, len(held.step), m * queue, m * len(w.A), m * len(F.A)])
+        # places of the states: plant x, forces that wait q, velocity estimates e, force filters f
         x, q, e, f = (slice(a, b) for a, b in pairwise(sizes))
         N, one = int(sizes[-1]), np.eye(m)
         states = np.eye(N)
@@ -274,6 +278,7 @@ class MultiLoop:
         open_[f] = states[f] + np.kron(F.A, one) @ states[f]
         enters[f] = np.kron(F.input[:, None], one)
         late = [past, *(states[q][m * k : m * (k + 1)] for k in range(queue))]
+        # late[k] is the command k samples old; unless a part of a sample splits the hold there is none of l + 1
         for gain, at in ((held.new, l), (held.old, l + 1)):
             if at < len(late):
                 open_[x] += gain @ late[at]
@@ -300,7 +305,8 @@ class MultiLoop:
 def _without_motions(
     affine: tuple[Floats, Floats, Floats, Floats], motions: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """A system without motions (N, d) that stay as they are and that nothing reads.
+    """A system, the four matrices of `MultiLoop.affine`, without motions (N, d) that stay as they are and that
+    nothing reads.
 
     One state each is left out, and what it says of its motion is taken off the others: x_i - x_p n_i / n_p. An
     orthogonal basis of the other motions would mix forces with positions, 1e8 times smaller, and no scaling of
@@ -311,7 +317,7 @@ def _without_motions(
     open_, enters, position, velocity = affine
     left_out = qr(motions.T, mode="r", pivoting=True)[1][: motions.shape[1]]
     kept = np.setdiff1d(np.arange(len(open_)), left_out)
-    along = np.linalg.solve(motions[left_out].T, motions[kept].T).T
+    along = np.linalg.solve(motions[left_out].T, motions[kept].T).T  # n_i / n_p
 
     def rows(matrix: Floats) -> Floats:
         return np.asarray(matrix[kept] - along @ matrix[left_out])
@@ -332,25 +338,26 @@ def unheld_positions(loop: Loop | MultiLoop) -> int:
     """How many roots z = 1 of walls without stiffness belong to positions that nobody holds; 0 with a spring to
     the ground, of the device, its operator, or a local loop."""
     if isinstance(loop, MultiLoop):
-        return _directions_unheld(loop)
+        return _unheld_of_several(loop)
     if "unheld" not in loop.results:
-        loop.results["unheld"] = _unheld(loop)
+        loop.results["unheld"] = _unheld_of_one(loop)
     return int(loop.results["unheld"])
 
 
 def set_aside(roots: Complexes, count: int) -> Complexes:
-    """Roots (..., N), of which so many, those nearest to z = 1, are replaced by 0."""
+    """Roots (..., N), of which `count`, those nearest to z = 1, are replaced by 0 if they are within AT_ONE of
+    it."""
     rest = np.array(roots, dtype=np.complex128)
     for _ in range(count):
         away = np.abs(rest - 1.0)
         at = np.argmin(away, axis=-1)[..., None]
-        own = np.take_along_axis(rest, at, axis=-1)
-        np.put_along_axis(rest, at, np.where(np.abs(own - 1.0) < AT_ONE, 0.0, own), axis=-1)
+        nearest = np.take_along_axis(rest, at, axis=-1)
+        np.put_along_axis(rest, at, np.where(np.abs(nearest - 1.0) < AT_ONE, 0.0, nearest), axis=-1)
     return rest
 
 
-def _unheld(loop: Loop) -> int:
-    """Roots z = 1 of one direction without stiffness: positions that force and sensor share and nobody holds."""
+def _unheld_of_one(loop: Loop) -> int:
+    """`unheld_positions` of one direction: a free motion that its force moves and its sensor reads."""
     plant, local = loop.plant, loop.controller.local_loop
     if plant.is_loaded or (local is not None and local.stiffness):
         return 0
@@ -365,8 +372,8 @@ def _unheld(loop: Loop) -> int:
     return max(1, int(np.count_nonzero(loop.sections.rows[:, 1] == 0.0)))
 
 
-def _directions_unheld(loop: MultiLoop) -> int:
-    """The same of several directions: independent free motions that their forces move and their sensors read."""
+def _unheld_of_several(loop: MultiLoop) -> int:
+    """`unheld_positions` of several directions: independent free motions that forces move and sensors read."""
     plant = loop.plant
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     free = shapes[:, squared == 0.0]
@@ -420,25 +427,27 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
         local = shapes[:, run].T @ plant.damping @ shapes[:, run]
         shapes[:, run] = shapes[:, run] @ np.linalg.eigh((local + local.T) / 2.0)[1]
     damping = shapes.T @ plant.damping @ shapes
-    level = max(float(np.max(np.abs(damping))), np.finfo(float).tiny)
+    level = max(float(np.max(np.abs(damping))), np.finfo(float).tiny)  # of which shares are rounding
     damping[np.abs(damping) <= 1e-14 * level] = 0.0
     inputs, outputs = shapes.T @ plant.actuators.T, plant.sensors @ shapes
     total = float(np.linalg.norm(inputs, axis=1).sum() * np.linalg.norm(outputs, axis=0).sum())
     coupled = np.abs(damping - np.diag(np.diag(damping))) > REPEATED * level
     from scipy.sparse.csgraph import connected_components  # imported here: it takes 0.2 s
 
+    # modes that damping couples, through others, too, are one block
     count, block_of = connected_components(coupled, directed=False)
-    alone = np.array([int(np.sum(block_of == number)) == 1 for number in block_of], dtype=bool)
+    uncoupled = np.array([int(np.sum(block_of == number)) == 1 for number in block_of], dtype=bool)
+    # uncoupled modes by groups of equal poles, whose frequency and damping are those of the first; then the blocks
     parts = [
         _equal_poles(squared[k], damping[k, k], inputs[group], outputs[:, group], (period, fraction), total)
-        for group in _groups(squared, np.diag(damping), np.flatnonzero(alone), tolerance, REPEATED * level)
+        for group in _groups(squared, np.diag(damping), np.flatnonzero(uncoupled), tolerance, REPEATED * level)
         for k in group[:1]
     ]
     for c in range(count):
         members = np.flatnonzero(block_of == c)
         if len(members) > 1:
             block = damping[np.ix_(members, members)]
-            parts.append(_coupled(squared[members], block, inputs[members], outputs[:, members], period))
+            parts.append(_coupled_modes(squared[members], block, inputs[members], outputs[:, members], period))
     from scipy.linalg import block_diag
 
     A = block_diag(*(part.A for part in parts))
@@ -453,7 +462,8 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
 def _groups(
     squared: Floats, drag: Floats, members: Ints, tolerance: Floats, drag_tolerance: float
 ) -> list[list[int]]:
-    """Modes in groups of equal frequency squared and damping, within tolerances (n,) [1/s²] and [1/s]."""
+    """Modes, `members` of all n, in groups of equal frequency squared (n,) and damping `drag` (n,), within
+    tolerances (n,) [1/s²] and [1/s]; each group by the modes' numbers."""
     groups: list[list[int]] = []
     for k in members.tolist():
         for group in groups:
@@ -466,8 +476,13 @@ def _groups(
     return groups
 
 
-def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> ContinuousPlant:
-    """Second-order modes as states [x; v / rate]: a slow mode's pair stays well apart from z = 1."""
+def _mode_states(
+    squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float
+) -> ContinuousPlant:
+    """Second-order modes as states [x; v / rate], 2 k of k modes: a slow mode's pair stays well apart from z = 1.
+
+    squared, damping  (k,) [1/s²], (k, k) [1/s];   inputs, outputs  (k, m), (m, k)
+    """
     k = len(squared)
     rate = np.maximum(np.sqrt(np.abs(squared)), np.abs(np.diag(damping)))
     rate[rate == 0.0] = 1.0 / period
@@ -481,29 +496,40 @@ def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, pe
 def _equal_poles(
     squared: float, drag: float, inputs: Floats, outputs: Floats, sampling: tuple[float, float], total: float
 ) -> ContinuousPlant:
-    """States of modes with equal poles: as many modes as the rank of their residue, by its singular values."""
+    """States of modes with equal poles: as many modes as the rank of their residue, by its singular values.
+
+    drag             damping of each [1/s], twice its decay
+    inputs, outputs  (k, m), (m, k) of the k modes
+    sampling         period [s] and fraction of the delay, as of `continuous_plant`
+    total            size of a residue against which one that is rounding is told
+    """
     period, decay = sampling[0], drag / 2.0
     left, strength, right = np.linalg.svd(outputs @ inputs)
     level = total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
     rank = int(np.sum(strength[: len(inputs)] * _reach(squared, drag, *sampling) > level))
     root = np.sqrt(strength[:rank])
     enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root
-    states = _pairs(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
+    states = _mode_states(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
     return ContinuousPlant(states.A, states.B, states.C, (motion_name(squared, decay),) * (len(inputs) - rank))
 
 
 def _reach(squared: float, drag: float, period: float, fraction: float) -> float:
-    """Motion of a mode by a held force, as a share of a free mass's; 0 at multiples of the sampling rate."""
+    """Motion of a mode by a force held for a period, in shares of a free mass's; 0 at multiples of the sampling
+    rate, which a hold does not reach."""
     one = np.ones((1, 1))
-    mode = _pairs(np.array([squared]), np.array([[drag]]), one, one, period)
+    mode = _mode_states(np.array([squared]), np.array([[drag]]), one, one, period)
     held = sample_plant(mode, period, fraction, 0.0)
+    # x over T^2, and v over T, which is A[0, 1] times the second state
     size = np.array([[1.0], [period * mode.A[0, 1]]]) / period**2
     return float(max(np.max(np.abs(held.new * size)), np.max(np.abs(held.old * size))))
 
 
-def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> ContinuousPlant:
-    """Modes that their damping couples; damped modes that no wall moves are split off by their eigenvectors."""
-    whole = _pairs(squared, damping, inputs, outputs, period)
+def _coupled_modes(
+    squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float
+) -> ContinuousPlant:
+    """States of modes that their damping couples; damped modes that no wall moves are split off by their
+    eigenvectors, unless these are ill conditioned. Arguments as of `_mode_states`."""
+    whole = _mode_states(squared, damping, inputs, outputs, period)
     poles, right = np.linalg.eig(whole.A)
     if np.linalg.cond(right) > DEFECTIVE:
         return whole
@@ -520,6 +546,8 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
     basis = np.hstack([np.column_stack([right[:, k].real, right[:, k].imag]) for k in chosen])
     basis = basis[:, np.linalg.norm(basis, axis=0) > 0.0]
     dual = np.linalg.inv(right)
+    # with a conjugate pair's vectors p +- i q and dual rows a +- i b, 2 a and -2 b are dual to p and q; a real
+    # pole has one row, without the factor
     rows = np.vstack([np.vstack([2.0 * dual[k].real, -2.0 * dual[k].imag]) for k in chosen])
     real = np.concatenate([[poles[k].imag == 0.0] * 2 for k in chosen])
     rows = np.where(real[:, None], rows / 2.0, rows)[~(real & (np.arange(len(rows)) % 2 == 1))]
@@ -534,6 +562,7 @@ def sample_plant(motion: ContinuousPlant, period: float, fraction: float, lag: f
         A = np.block([[A, B], [np.zeros((m, N)), -np.eye(m) / lag]])
         B = np.vstack([np.zeros((N, m)), np.eye(m) / lag])
         C = np.hstack([C, np.zeros((m, m))])
+    # Gamma(T), then exp(A (1 - f) T) and Gamma((1 - f) T), and Gamma(f T)
     _, whole = _integrals(A, period)
     late, new = _integrals(A, (1.0 - fraction) * period)
     _, early = _integrals(A, fraction * period)
@@ -541,7 +570,7 @@ def sample_plant(motion: ContinuousPlant, period: float, fraction: float, lag: f
 
 
 def _integrals(A: Floats, time: float) -> tuple[Floats, Floats]:
-    """exp(A t) and its integral over [0, t]."""
+    """exp(A t) and its integral over [0, t], both (N, N), of one exponential."""
     N = len(A)
     whole = np.zeros((2 * N, 2 * N))
     whole[:N, :N], whole[:N, N:] = A * time, np.eye(N)

@@ -133,8 +133,8 @@ class OperatingPoint(PosedDevice):
         return attach(plant, self.operator, self._motions_across(plant))
 
     def _attach_arm(self, plant: Plant, force: Floats, gravity: Floats) -> Plant:
-        """A full plant with the arm at its handle, which pushes with a force (3,) under gravity (3,). Raises
-        ModelError for a reduced model, OperatorError where the arm cannot hold the handle."""
+        """A full plant with the arm at its handle, which pushes with a force (3,) [N] under gravity (3,) [m/s²].
+        Raises ModelError for a reduced model, OperatorError where the arm cannot hold the handle."""
         if self.model not in ("full", None):
             raise ModelError(
                 f"an arm that is a chain of bodies holds the full model alone, not {self.model!r}; leave the "
@@ -156,6 +156,7 @@ class OperatingPoint(PosedDevice):
             return none
         u = self.direction[:3] / np.linalg.norm(self.direction[:3])
         handle = self.handle_rows
+        # two directions across u, and how the handle moves along them per rate of each coordinate
         across = np.linalg.svd(np.eye(3) - np.outer(u, u))[2][:2] @ handle
         left, size, _ = np.linalg.svd(across, full_matrices=False)
         kept = size > MOVES * np.linalg.norm(handle)

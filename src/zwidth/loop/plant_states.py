@@ -41,7 +41,7 @@ NEUTRAL = 1e-11  # share of what holds a motion, or of what a load adds, that is
 
 @dataclass(frozen=True)
 class Mode:
-    """xi'' + 2 decay xi' + squared xi = a,  on the states [xi, xi'/rate].
+    """xi'' + 2 decay xi' + squared xi = a,  on the states [xi, xi'/rate], rate [1/s] making both of one size.
 
     output        reading y per xi;   force_output (2,)  the force f per state
     """
@@ -88,16 +88,16 @@ class PlantStates:
     @cached_property
     def output(self) -> Floats:
         """The reading y per state (k,)."""
-        own = np.zeros(0) if self.form is None else self.form.output
-        return np.append([x for mode in self.modes for x in (mode.output, 0.0)], own)
+        of_form = np.zeros(0) if self.form is None else self.form.output
+        return np.append([x for mode in self.modes for x in (mode.output, 0.0)], of_form)
 
     @cached_property
     def force_output(self) -> Floats:
         """The force f per state (k,)."""
-        form, own = self.form, np.zeros(0)
+        form, of_form = self.form, np.zeros(0)
         if form is not None:
-            own = np.zeros(len(form.input)) if form.second_output is None else form.second_output
-        return np.append([x for mode in self.modes for x in mode.force_output], own)
+            of_form = np.zeros(len(form.input)) if form.second_output is None else form.second_output
+        return np.append([x for mode in self.modes for x in mode.force_output], of_form)
 
     def growth(self, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
         """exp(A t) - 1 (k, k), and the states (k, 1 + r) that unit lagged forces without command leave after a
@@ -140,14 +140,15 @@ def _modal_states(modes: RealModes, period: float, rows: Floats) -> PlantStates:
     rows  (3, n)  of the force sensor, per acceleration, velocity and place of each mode
     """
     a, squared, T = modes.decay, modes.frequency_squared, period
-    force = np.array([rows[2] - squared * rows[0], rows[1] - 2.0 * a * rows[0]])  # per place and velocity
+    # per place and velocity (2, n), the acceleration being -2 a velocity - squared place
+    force = np.array([rows[2] - squared * rows[0], rows[1] - 2.0 * a * rows[0]])
     # the force per force counts itself: a feedback moves poles by what it reads of them
     together = np.abs(modes.input).sum() * np.abs(modes.output).sum()
     reach = np.array([together * T**2, SECOND_UNREAD / UNOBSERVED_UNDAMPED])
     kept, hidden, names = [], list[float](), list[str]()
     for group in equal_modes(modes):
-        one = group[0]
-        y = float(modes.input[group] @ modes.output[group])
+        one = group[0]  # whose frequency and damping all of the group have
+        y = float(modes.input[group] @ modes.output[group])  # residues: in the reading, and in the force
         place, velocity = force[:, group] @ modes.input[group]
         # a mode at a multiple of the sampling rate is not reached by a hold
         held = float(np.max(np.abs(modal_row(a[one], squared[one], T)[2:]))) / T**2
@@ -163,7 +164,8 @@ def _modal_states(modes: RealModes, period: float, rows: Floats) -> PlantStates:
 
 
 def _coupled_states(plant: Plant, period: float, force_rows: Floats | None) -> PlantStates:
-    """States of a plant whose dampers couple its modes or lag: those of its form, and the free motion beside."""
+    """States of a plant whose dampers couple its modes or lag: those of its first-order form, and the free motion
+    that is kept beside it. force_rows: `plant_states`."""
     form = first_order_form(plant, period, np.zeros((3, plant.size)) if force_rows is None else force_rows)
     free = [Mode(0.0, 0.0, 1.0 / period, form.free_residue, np.zeros(2))] if form.free_residue else []
     names = [motion_name(0.0, 0.0)] * (form.free_count - len(free))
@@ -178,22 +180,22 @@ def _loaded_states(
 ) -> PlantStates:
     """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
     of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a
-    large plant, as links that bend have."""
-    n, T, lags = plant.size, period, plant.lagged_dampers
+    large plant, as links that bend have. Arguments as of `plant_states`."""
+    n, T, lagged_dampers = plant.size, period, plant.lagged_dampers
     V = np.eye(n)  # a plant on its modes without load keeps what the load adds to the last digit
     if not np.array_equal(plant.mass, V):
         V = undamped_modes(plant.mass, plant.stiffness)[1]
     K, B = V.T @ plant.stiffness @ V, V.T @ plant.damping @ V
     if plant.circulatory is not None:
         K = K + V.T @ plant.circulatory @ V
-    size = 2 * n + len(lags)
+    size = 2 * n + len(lagged_dampers)
     A = np.zeros((size, size))
     A[:n, n : 2 * n], A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = np.eye(n) / T, -K * T, -B
-    for i, damper in enumerate(lags):
-        along, own = V.T @ damper.along, 2 * n + i
-        A[n : 2 * n, own] = -damper.damping * along
-        A[own, n : 2 * n] = along / damper.time_constant
-        A[own, own] = -1.0 / damper.time_constant
+    for i, damper in enumerate(lagged_dampers):
+        along, force = V.T @ damper.along, 2 * n + i
+        A[n : 2 * n, force] = -damper.damping * along
+        A[force, n : 2 * n] = along / damper.time_constant
+        A[force, force] = -1.0 / damper.time_constant
 
     def column(vector: Floats) -> Floats:
         """Input (size,) of a force along (n,), which changes the velocities [m per period]."""
@@ -205,6 +207,7 @@ def _loaded_states(
         return np.append(vector @ V, np.zeros(size - n))
 
     rows = np.zeros((3, n)) if force_rows is None else force_rows @ V
+    # the measured force per state: of the acceleration, A's rows of the velocities over T, of velocity and place
     second = np.asarray(rows[0] @ A[n : 2 * n] / T)
     second[n : 2 * n] += rows[1] / T
     second[:n] += rows[2]
@@ -230,12 +233,13 @@ def _loaded_states(
     )
     readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
     pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
-    drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lags), np.zeros((n, n)))
+    drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lagged_dampers), np.zeros((n, n)))
     feedback = pushes.T @ readings
     # each mode in its own units, so that the stiff ones do not hide the free ones
     bare = np.diag(K) if plant.without_load is None else np.diag(V.T @ plant.without_load.stiffness @ V)
     added = max(_largest(K - np.diag(bare)), _largest(feedback), np.finfo(float).tiny)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(bare), added))
+    # a place at which neither springs nor readings push stays, a pole at z = 1; one that no damper slows, two
     neutral = _nullity(scale[:, None] * (K - feedback) * scale)
     still = _nullity(np.vstack([scale[:, None] * part * scale for part in (K, feedback, drag / T)]))
     states = PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
@@ -243,7 +247,8 @@ def _loaded_states(
 
 
 def _without_fast(states: PlantStates, form: FirstOrderForm, period: float) -> PlantStates:
-    """The states of a plant under load without its fast motions that no force shows in any reading."""
+    """The states of a plant under load, whose form is given, without its fast motions that no force shows in any
+    reading."""
     sampled = states.sampled
     inputs = np.array([form.input, *(each.input for each in sampled)])
     seen = [form.output, *(each.reading for each in sampled)]
@@ -269,6 +274,7 @@ def _nullity(matrix: Floats) -> int:
 
 
 def _largest(matrix: Floats) -> float:
+    """Largest size of an entry, 0 of an empty matrix."""
     return float(np.max(np.abs(matrix), initial=0.0))
 
 

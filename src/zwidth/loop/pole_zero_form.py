@@ -72,6 +72,8 @@ def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag:
     With lag, P are the states after T from a unit lagged force without command, Q those from a unit command:
 
         (d + s) y = output Q + output (d - E)^-1 [ s_in P + (s + E) Q ]
+
+    s, s_in  `lag_share` of the period, and of the time for which the command of Q acts
     """
     T, rest = period, (1.0 - fraction) * period
     E, P, Q = step_growth(form, T, lag)
@@ -123,7 +125,7 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
     """`form_rows` in decimal arithmetic, with the poles of the sampled matrix to many digits: rows of the states
     as their doubles are, where springs or masses of very unlike size leave rounding in place of them.
 
-    Returns  no rows, (0, 8), where poles are equal to rounding, and for a large form
+    Returns  no rows, (0, 8), where poles are equal to rounding, and for a form of more than MOST_STATES states
     """
     none, k = np.zeros((0, 8)), len(sampled.output)
     if k > MOST_STATES:
@@ -145,11 +147,11 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
                 return none
             if len(found) == 1:  # joined by a pole at z = 0, which no wall moves
                 found.append((Decimal(-1), Decimal(0)))
-            (x, y), (x2, y2) = found
+            (x, y), (x2, y2) = found  # roots x + i y, x2 + i y2, conjugate or both real
             d1, d0 = -(x + x2), x * x2 - y * y2
             row = [d1, d0]
-            through = [[exact_dot(line, G) for line in E] for _, G in parts]
-            for (direct, G), moved in zip(parts, through, strict=True):
+            products = [[exact_dot(line, G) for line in E] for _, G in parts]  # E G of each part
+            for (direct, G), moved in zip(parts, products, strict=True):
                 row += [
                     direct,
                     exact_dot(c, G) + direct * d1,
@@ -161,7 +163,7 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
                     Decimal(0),
                     [exact_dot(line, moved) + d1 * m + d0 * g for line, m, g in zip(E, moved, G, strict=True)],
                 )
-                for (_, G), moved in zip(parts, through, strict=True)
+                for (_, G), moved in zip(parts, products, strict=True)
             ]
     return np.array(rows).reshape(-1, 8)
 
@@ -169,8 +171,8 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
 def separate_rows(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
     """Rows (m, 8) as of `form_rows`, one for each pair of poles on a subspace of its own, none divided by another.
 
-    Where poles lie far apart these keep digits that a long chain loses. Where two pairs are nearly equal there are
-    none such: no rows, (0, 8).
+    Where poles lie far apart these keep digits that a long chain loses. Where two pairs are nearly equal they have
+    no subspaces of their own: no rows, (0, 8).
     """
     rows, pairs = [], _pairs(form.poles, period)
     for pair, other in combinations(pairs, 2):
@@ -178,14 +180,14 @@ def separate_rows(form: FirstOrderForm, period: float, fraction: float = 0.0, la
             return np.zeros((0, 8))
     for pair in pairs:
         right, left = invariant_subspace(form, pair)
-        own = replace(
+        form_of_pair = replace(
             form,
             dynamics=left.T @ form.dynamics @ right,
             input=left.T @ form.input,
             output=form.output @ right,
             poles=pair,
         )
-        rows.append(form_rows(own, sample_form(own, period, fraction, lag), period))
+        rows.append(form_rows(form_of_pair, sample_form(form_of_pair, period, fraction, lag), period))
     return np.vstack(rows)
 
 
@@ -207,6 +209,7 @@ def rows_error(rows: Floats, sampled: SampledForm) -> float:
     )
     new, old = (sampled.output @ states).T
     wanted = new + sampled.direct_new + (old + sampled.direct_old) / z
+    # over: 1 / (the denominators by which a row is divided, its own and those of the chain before it)
     found, over = np.zeros(ROW_PROBES, dtype=np.complex128), np.ones(ROW_PROBES, dtype=np.complex128)
     for d1, d0, n2, n1, n0, o2, o1, o0, chained in rows:
         below = (d + d1) * d + d0
@@ -218,20 +221,28 @@ def rows_error(rows: Floats, sampled: SampledForm) -> float:
 
 
 def _without_subspace(G: Floats, right: Floats, left: Floats) -> Floats:
-    """G without its part in a subspace, in entries where that part is more than the rounding of this product."""
+    """G (k,) without its part in a subspace, in entries where that part is more than the rounding of this product.
+
+    right, left  (k, r)  bases of the subspace and of its dual, left^T right = 1
+    """
     part = right @ (left.T @ G)
     rounding = 1e-15 * (np.abs(right) @ (np.abs(left.T) @ np.abs(G)))
     return G - np.where(np.abs(part) > rounding, part, 0.0)
 
 
 def step_growth(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-    """exp(A t) - 1 (k, k), and states (k,) after a time t from a unit lagged force and from a unit command."""
+    """exp(A t) - 1 (k, k), and states (k,) after a time t: from a unit lagged force without command, and from rest
+    under a unit command through the lag [s]; without lag the first is 0."""
     growth, lagged, pushed = steps_growth(form.dynamics, form.input[:, None], time, lag)
     return growth, lagged[:, 0], pushed[:, 0]
 
 
 def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-    """`step_growth` of r forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and states (k, r)."""
+    """`step_growth` of r forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and both states (k, r).
+
+    One exponential has all: of states, k auxiliary rows, forces and commands. The auxiliary columns hold the
+    integral of exp(A t) over the step, in units of t, and A t times that is exp(A t) - 1 without cancellation.
+    """
     from scipy.linalg import expm
 
     A, b, (k, r) = dynamics * time, inputs * time, inputs.shape
@@ -248,8 +259,8 @@ def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> t
 
 
 def _pairs(poles: Complexes, period: float) -> list[Complexes]:
-    """Poles two by two, fast ones first: conjugates together, a real one with its neighbour unless that is much
-    faster."""
+    """Poles [1/s] two by two, fast ones first: conjugates together, a real one with its neighbour unless that is
+    much faster; an array of one pole then."""
     pairs = [np.array([value, value.conjugate()]) for value in poles[poles.imag > 0.0]]
     real = list(poles[poles.imag == 0.0][np.argsort(np.abs(poles[poles.imag == 0.0]))])
     while real:
@@ -262,7 +273,7 @@ def _pairs(poles: Complexes, period: float) -> list[Complexes]:
 
 
 def sampled_poles(poles: Complexes, period: float) -> Complexes:
-    """exp(s T) - 1 without cancellation near 0."""
+    """exp(s T) - 1 of poles s (k,) [1/s], without cancellation near 0."""
     x = poles * period
     real = np.expm1(x.real) * np.cos(x.imag) - 2.0 * np.sin(x.imag / 2.0) ** 2
     return real + 1j * np.exp(x.real) * np.sin(x.imag)
@@ -287,7 +298,8 @@ WELL_INSIDE = 0.5  # |z| below which a root that poles and zeros share decides o
 
 @dataclass(frozen=True)
 class PoleZeroForm:
-    """gain * product (d - zeros) / product (d - poles),  d = z - 1; conjugates both. Fewer zeros than poles."""
+    """gain * product (d - zeros) / product (d - poles),  d = z - 1, with both of each conjugate pair. Fewer zeros
+    than poles."""
 
     poles: Complexes
     zeros: Complexes
@@ -308,26 +320,29 @@ def pole_zero_form(
 
     form         without `old` and direct parts
     zero_poles   how many of the poles are 0 exactly: places and speeds that a free motion keeps
-    path         another form, whose zeros the response has, too
+    path         a form with the zeros of the response that are not known
     known_zeros  the other zeros of the response
+
+    What does not match the response to GOOD is tried again from other starts and with longer steps; what misses it
+    by more than KEPT_DIGITS then, in decimal arithmetic.
     """
     system, behind = _Balanced.of(form), _Balanced.of(path)
     poles = np.linalg.eigvals(system.E).astype(np.complex128)
     poles = _with_exact_zeros(poles, zero_poles)
-    zeros, own = behind.zeros(), np.linalg.eigvals(behind.E).astype(np.complex128)
+    zeros, path_poles = behind.zeros(), np.linalg.eigvals(behind.E).astype(np.complex128)
     match = _Match(system, _probes(poles), zero_poles)
-    finer = _improved(behind, zeros, SMALL_STEP, own)
-    found = match.best([_improved(system, poles, SMALL_STEP, None)], [np.append(known_zeros, finer)])
-    if found[1] > GOOD:
-        some = [zeros, finer, _improved(behind, _off_axis(zeros), ANY_STEP, own, MANY_STEPS)]
+    finer = _improved(behind, zeros, SMALL_STEP, path_poles)
+    found, error = match.best([_improved(system, poles, SMALL_STEP, None)], [np.append(known_zeros, finer)])
+    if error > GOOD:
+        some = [zeros, finer, _improved(behind, _off_axis(zeros), ANY_STEP, path_poles, MANY_STEPS)]
         steps = [_improved(system, poles, longest, None) for longest in (SMALL_STEP, LONG_STEP)]
         steps.append(_improved(system, _off_axis(poles), ANY_STEP, None, MANY_STEPS))
-        found = match.best([poles, *steps], [np.append(known_zeros, each) for each in some])
-    if found[1] > KEPT_DIGITS:
+        found, error = match.best([poles, *steps], [np.append(known_zeros, each) for each in some])
+    if error > KEPT_DIGITS:
         exact = _exact_form(system, zero_poles)
-        if exact is not None and (error := match.error(exact)) < found[1]:
-            found = exact, error
-    return _without_common_roots(found[0]), found[1]
+        if exact is not None and (exact_error := match.error(exact)) < error:
+            found, error = exact, exact_error
+    return _without_common_roots(found), error
 
 
 def _with_exact_zeros(poles: Complexes, count: int) -> Complexes:
@@ -347,7 +362,9 @@ class _Match:
     """
 
     def __init__(self, system: _Balanced, d: Complexes, zero_poles: int) -> None:
-        """Keep the system's response at d = z - 1 (k,), and the errors of it that count as 1."""
+        """Keep the system's response at d = z - 1 (k,); `allowed` (k,), the size of an error that counts as 1, and
+        `relevant` (k,), whether walls there can be edges. The response P counts as P d^2, which is constant for a
+        free mass."""
         self.d, self.wanted = d, system.response(d)
         size = np.abs(self.wanted * d**2)
         slow = np.minimum(np.abs(d) / SLOW, 1.0) ** zero_poles
@@ -355,7 +372,8 @@ class _Match:
         self.relevant = size > IRRELEVANT * np.max(size)
 
     def best(self, poles: list[Complexes], zeros: list[Complexes]) -> tuple[PoleZeroForm, float]:
-        """The form of one of the sets of poles and one of the sets of zeros with the least error, and that."""
+        """The form of one of the sets of poles and one of the sets of zeros with the least error, and that error;
+        inf where none has conjugates to all its roots. Its gain is the median that matches the response."""
         none = np.zeros(0, dtype=np.complex128)
         found, least = PoleZeroForm(none, none, 0.0), np.inf
         for some, others in product(map(_conjugate_pairs, poles), map(_conjugate_pairs, zeros)):
@@ -375,7 +393,7 @@ class _Match:
             off = np.abs(form.response(self.d) - self.wanted) / self.allowed
         # at high frequency the system's own response has few digits left, which the form is not to follow
         error = float(np.median(off) + FEW_DIGITS * np.max(off))
-        return error if error == error else np.inf
+        return error if error == error else np.inf  # nan is not equal to itself
 
 
 def _exact_form(system: _Balanced, zero_poles: int) -> PoleZeroForm | None:
@@ -393,12 +411,12 @@ def _exact_form(system: _Balanced, zero_poles: int) -> PoleZeroForm | None:
     pairs = _conjugate_pairs(_with_exact_zeros(poles, zero_poles)), _conjugate_pairs(zeros)
     if pairs[0] is None or pairs[1] is None:
         return None
-    return PoleZeroForm(pairs[0], pairs[1], float(above[-1]))
+    return PoleZeroForm(pairs[0], pairs[1], float(above[-1]))  # `below` is monic
 
 
 def _exact_roots(p: Polynomial) -> Complexes | None:
-    """Roots of a polynomial, None where they do not settle; those at z = 0, of commands that wait, are divided out
-    first, since equal ones do not settle."""
+    """Roots in d of a polynomial, None where they do not settle; those at z = 0, d = -1, of commands that wait,
+    are divided out first, since equal ones do not settle."""
     rest, waiting = without_roots(p, -1)
     companion = np.diag(np.ones(len(rest) - 2), -1) if len(rest) > 1 else np.zeros((0, 0))
     if len(rest) > 1:
@@ -412,7 +430,7 @@ def _exact_roots(p: Polynomial) -> Complexes | None:
 
 @dataclass(frozen=True)
 class _Balanced:
-    """A form in units in which its rows and columns are of one size."""
+    """The form c (d - E)^-1 g with its states in units in which rows and columns of E are of one size."""
 
     E: Floats
     g: Floats
@@ -476,9 +494,10 @@ def _off_axis(roots: Complexes) -> Complexes:
 def _improved(
     system: _Balanced, roots: Complexes, longest: float, poles: Complexes | None, steps: int = STEPS
 ) -> Complexes:
-    """Poles (k,) after some steps of Newton's method, zeros where `poles` is given. What is 0 stays so.
+    """Poles (k,) after some steps of Newton's method, or zeros where `poles` is given. What is 0 stays so.
 
-    longest  step, in shares of the distance to the next root
+    longest  longest step that is made, in shares of the distance to the next root
+    poles    the system's own, to which no zero may jump; None: `roots` are poles
     """
     n, at, movable = len(system.g), roots.copy(), roots != 0.0
     for _ in range(steps if len(at) else 0):
@@ -499,7 +518,8 @@ def _improved(
 
 
 def _slope(system: _Balanced, at: Complexes, n: int, of_zeros: bool) -> Complexes:
-    """Logarithmic derivative of det(d - E), or of c adj(d - E) g, at d (k,); not finite exactly at a pole."""
+    """Logarithmic derivative of det(d - E), or `of_zeros` of c adj(d - E) g, at d (k,), n being the size of E; not
+    finite exactly at a pole."""
     resolvent = at[:, None, None] * np.eye(n) - system.E
     try:
         inverse = np.linalg.inv(resolvent)
@@ -517,8 +537,8 @@ def _slope(system: _Balanced, at: Complexes, n: int, of_zeros: bool) -> Complexe
 def _conjugate_pairs(roots: Complexes) -> Complexes | None:
     """Roots in exact conjugate pairs one after the other, then the real ones, largest first; None where a root has
     no conjugate."""
-    alone = np.abs(roots.imag) <= REAL * np.abs(roots)
-    real, upper = roots[alone].real, roots[(roots.imag > 0.0) & ~alone]
+    on_axis = np.abs(roots.imag) <= REAL * np.abs(roots)
+    real, upper = roots[on_axis].real, roots[(roots.imag > 0.0) & ~on_axis]
     if len(real) + 2 * len(upper) != len(roots):
         return None
     upper = upper[np.argsort(-np.abs(upper))]

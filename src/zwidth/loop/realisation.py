@@ -38,7 +38,7 @@ class StateSpace:
     velocity: Floats
 
     def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
-        """L (..., N, N) for walls (...), whose axes broadcast with those of the loops."""
+        """L (..., N, N) for walls K [N/m], B [N s/m] (...), whose axes broadcast with those of the loops."""
         K, B = np.asarray(wall_stiffness)[..., None], np.asarray(wall_damping)[..., None]
         feedback = K * self.position + B * self.velocity
         return self.open - self.input[..., :, None] * feedback[..., None, :]
@@ -53,7 +53,8 @@ def pole_pair(d1: Floats | float, d0: Floats | float) -> tuple[Floats, Floats]:
 
         [[1 + x, t], [-q/t, 1 + x]],    x = -d1/2,   q = d0 - x^2
 
-    A complex pair gives a normal matrix (t = sqrt q), whose eigenvalues are perfectly conditioned.
+    A complex pair gives a normal matrix (t = sqrt q), whose eigenvalues are perfectly conditioned. Of real roots t
+    is at least |x|, their size: q is 0 where they are equal.
     """
     x = -0.5 * np.asarray(d1, dtype=np.float64)
     q = np.asarray(d0) - x * x
@@ -67,7 +68,10 @@ def pole_pair(d1: Floats | float, d0: Floats | float) -> tuple[Floats, Floats]:
 
 
 def _numerator_input(n1: Floats, n0: Floats, d1: Floats, t: Floats) -> Floats:
-    """Input vector (..., 2) that gives (n1 d + n0)/(d^2 + d1 d + d0) from the first state of `pole_pair`."""
+    """Input vector (..., 2) that gives (n1 d + n0)/(d^2 + d1 d + d0) from the first state of `pole_pair`.
+
+    t  the block's coupling: with inputs i, j the first state is [ (d + d1/2) i + t j ] / (d^2 + d1 d + d0)
+    """
     out = np.empty((*np.shape(t), 2))
     out[..., 0], out[..., 1] = n1, (n0 - d1 / 2.0 * n1) / t
     return out
@@ -81,27 +85,32 @@ class _Signal:
     force: Floats | float
 
     def drive(self, at: slice, gain: Floats, space: StateSpace) -> None:
-        """Let the signal drive some states with a gain (..., k) each."""
+        """Let the signal drive the k states `at`, each with its gain (..., k): added to `space` in place."""
         space.open[..., at, :] += gain[..., :, None] * self.states[..., None, :]
         space.input[..., at] += gain * np.asarray(self.force)[..., None]
 
     def scaled(self, factor: Floats) -> _Signal:
+        """The signal times a factor (...)."""
         return _Signal(factor[..., None] * self.states, factor * self.force)
 
 
 def orders(denominator: Floats) -> tuple[int, ...]:
-    """Degree, 1 or 2, of each factor (..., k, 3); the same for all loops that are realised together."""
+    """Degree, 1 or 2, of each factor, rows (..., k, 3) d2, d1, d0 of d2 d^2 + d1 d + d0; the same for all loops
+    that are realised together."""
     return tuple(2 if np.any(denominator[..., k, 0]) else 1 for k in range(denominator.shape[-2]))
 
 
 def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, estimator: Estimator) -> StateSpace:
     """Assemble plant sections, force path, delayed forces and the estimate's factors into one state vector.
 
-    sections  of loops of one structure, rows (..., m, 9); their axes are those of the result
-    split     whether the fractional part of the delay splits the hold
+    sections     of loops of one structure, rows (..., m, 9); their axes are those of the result
+    whole_delay  samples
+    split        whether the fractional part of the delay splits the hold
+    force        factors of the force path, of the same degrees in all loops
     """
     queue, past_samples = whole_delay + split, estimator.window.shape[-1] - 1
     sizes = (_plant_states(sections), sum(orders(force.denominator)), queue, past_samples)
+    # states in this order: plant, force path, forces that wait, past readings, factors of the velocity estimate
     N, loops = sum(sizes) + sum(orders(estimator.denominator)), sections.rows.shape[:-2]
     space = StateSpace(np.zeros((*loops, N, N)), *(np.zeros((*loops, N)) for _ in range(3)))
     first = np.cumsum((0, *sizes))
@@ -126,14 +135,15 @@ def _plant_states(sections: Sections) -> int:
 
 
 def _rows_before_chain(sections: Sections) -> int:
-    """Number of rows before the chain, which begins at the last row that is not chained."""
+    """Number of rows before the chain, which begins with the last row that is not divided by the one before it;
+    all rows without a chain."""
     if sections.sampled_form is None:
         return int(sections.rows.shape[-2])
-    return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1])
+    return int(np.flatnonzero(sections.rows[:, CHAINED] == 0.0)[-1])
 
 
 def _delay_line(space: StateSpace, signal: _Signal, count: int, start: int) -> list[_Signal]:
-    """The signal and its `count` past values, newest first."""
+    """The signal and its `count` past values, newest first, each past one a state from number `start` on."""
     signals = [signal]
     for at in range(start, start + count):
         signals[-1].drive(slice(at, at + 1), np.ones(1), space)
@@ -142,8 +152,10 @@ def _delay_line(space: StateSpace, signal: _Signal, count: int, start: int) -> l
 
 
 def _plant_reading(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | None) -> Floats:
-    """Let the forces `new` and `old` drive the plant's states; returns the states' weights (..., N) in the
-    reading."""
+    """Let wall forces drive the plant's states; returns the states' weights (..., N) in the reading.
+
+    new, old  the force of the later part of the interval, and of its earlier part; None where nothing splits it
+    """
     reading = np.zeros_like(space.position)
     leading = _rows_before_chain(sections)
     _row_states(space, sections.rows[..., :leading, :], new, old, reading)
@@ -153,11 +165,12 @@ def _plant_reading(space: StateSpace, sections: Sections, new: _Signal, old: _Si
 
 
 def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | None, reading: Floats) -> None:
-    """Add two states for each row, and their weights to the reading.
+    """Add two states for each of the rows (..., m, 9), and their weights to the reading (..., N), in place.
 
-    In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0).
+    In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0). new, old:
+    `_plant_reading`
     """
-    before = np.zeros(2)
+    before = np.zeros(2)  # input vector through which the row before is driven
     for k in range(rows.shape[-2]):
         d1, d0, n2, n1, n0, o2, o1, o0, chained = (rows[..., k, column] for column in range(9))
         at = slice(2 * k, 2 * k + 2)
@@ -176,7 +189,11 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
 def _chain_states(
     space: StateSpace, sampled: SampledForm, at: slice, new: _Signal, old: _Signal | None, reading: Floats
 ) -> None:
-    """Add the states from which the chained rows are made, and their weights to the reading."""
+    """Add the states `at` of a sampled form, which stand for the chained rows, and their weights to the reading
+    (..., N), in place.
+
+    new, old  as of `_plant_reading`
+    """
     space.open[at, at] = np.eye(len(sampled.output)) + sampled.growth
     reading[at] += sampled.output
     for signal, source, direct in ((new, sampled.new, sampled.direct_new), (old, sampled.old, sampled.direct_old)):
@@ -186,11 +203,13 @@ def _chain_states(
 
 
 def _cascade(space: StateSpace, signal: _Signal, numerator: Floats, denominator: Floats, start: int) -> _Signal:
-    """The signal after a cascade of factors, whose states begin at `start`."""
+    """The signal after a cascade of factors, rows (..., k, 3) c2, c1, c0 of c2 d^2 + c1 d + c0, whose states begin
+    at number `start`."""
     at = start
     for k, order in enumerate(orders(denominator)):
         c2, c1, c0 = (numerator[..., k, column] for column in range(3))
         d1, d0 = denominator[..., k, 1], denominator[..., k, 2]
+        # polynomial division: the highest coefficient passes the signal on, what remains is read from the states
         if order == 1:
             signal.drive(slice(at, at + 1), np.ones(1), space)
             space.open[..., at, at] += 1.0 - d0
@@ -208,10 +227,12 @@ def _cascade(space: StateSpace, signal: _Signal, numerator: Floats, denominator:
 
 
 CHAINED = 8  # column of a row that is 1 where it is chained
+LEADING = 3  # column d2 of `LoopTable.force` and `velocity`, 0 of a factor of first order
 
 
 def state_spaces(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpace]]:
-    """Some of the loops, by structure: their places in `which`, and their states (p, ...).
+    """Some of the loops, by structure: the places (p,) in `which` of those of one structure, and their states,
+    each array (p, ...).
 
     which   (n,)  numbers of loops; those that have no sections are left out
     Raises  ValueError  for chained sections: `Loop.state_space` has better states than their rows
@@ -219,31 +240,34 @@ def state_spaces(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpa
     if np.any(loops.rows[which, :, CHAINED]):
         raise ValueError("chained sections are realised one loop at a time, by Loop.state_space")
     kinds, kind_of = np.unique(_structure(loops, which), axis=0, return_inverse=True)
-    for kind, structure in enumerate(kinds):
+    for kind, (section_count, *_) in enumerate(kinds):
         places = np.flatnonzero(kind_of.ravel() == kind)
-        if structure[0]:
+        if section_count:
             yield places, _states(loops, which[places])
 
 
 def _structure(loops: LoopTable, which: Ints) -> Ints:
-    """Numbers (n, s) that loops have in common that are realised together; the number of sections first."""
-    c = loops.computer[which]
+    """Numbers (n, s) of each loop that are equal in loops that are realised together: the number of sections
+    first, then those of its computer, last whether each factor is of second order."""
+    computers = loops.computer[which]
     counts = (loops.whole_delay, loops.split, loops.force_count, loops.velocity_count, loops.window_count)
-    orders = [factors[c, :, 3] != 0.0 for factors in (loops.force, loops.velocity)]
-    return np.column_stack([loops.section_count[which], *(count[c] for count in counts), *orders]).astype(np.int64)
+    second_order = [factors[computers, :, LEADING] != 0.0 for factors in (loops.force, loops.velocity)]
+    return np.column_stack(
+        [loops.section_count[which], *(count[computers] for count in counts), *second_order]
+    ).astype(np.int64)
 
 
 def _states(loops: LoopTable, which: Ints) -> StateSpace:
-    """States of loops of one structure."""
-    c, one = loops.computer[which], loops.computer[which[0]]
-    force = loops.force[c, : loops.force_count[one]]
-    velocity = loops.velocity[c, : loops.velocity_count[one]]
+    """States of the loops `which` (n,), all of one structure, whose counts are those of the first."""
+    computers, one = loops.computer[which], loops.computer[which[0]]
+    force = loops.force[computers, : loops.force_count[one]]
+    velocity = loops.velocity[computers, : loops.velocity_count[one]]
     return realise(
         Sections(loops.rows[which, : loops.section_count[which[0]]], ()),
         int(loops.whole_delay[one]),
         bool(loops.split[one]),
         Filter(force[..., :3], force[..., 3:]),
-        Estimator(velocity[..., :3], velocity[..., 3:], loops.window[c, : loops.window_count[one]]),
+        Estimator(velocity[..., :3], velocity[..., 3:], loops.window[computers, : loops.window_count[one]]),
     )
 
 
@@ -287,9 +311,9 @@ def filter_states(numerator: Floats, denominator: Floats, window: Floats) -> Fil
     past = len(window) - 1
     N = past + sum(orders)
     A, source = np.zeros((N, N)), np.zeros(N)
-    signal, direct = np.zeros(N), float(window[0])
+    signal, direct = np.zeros(N), float(window[0])  # what has passed so far: signal . states + direct u
     for k in range(past):
-        A[k, k] = -1.0
+        A[k, k] = -1.0  # a past sample: x_{j+1} = x_j + A x_j + ... keeps nothing of its own
         if k:
             A[k, k - 1] = 1.0
         else:
@@ -297,6 +321,7 @@ def filter_states(numerator: Floats, denominator: Floats, window: Floats) -> Fil
         signal[k] = window[k + 1]
     at = past
     for (c2, c1, c0), (_, d1, d0), order in zip(numerator, denominator, orders, strict=True):
+        # numerator/denominator = pass_on + leave (d - block)^-1 enter
         if order == 1:
             block, enter, leave, pass_on = np.array([[-d0]]), np.ones(1), np.array([c0 - c1 * d0]), c1
         else:

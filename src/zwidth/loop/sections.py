@@ -88,12 +88,12 @@ def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float
 def equal_modes(modes: RealModes) -> list[list[int]]:
     """Groups of modes, by their indices, that have one frequency and one damping to rounding."""
     tolerance = repeat_tolerance(modes.frequency_squared)
-    drag = max(float(np.max(np.abs(modes.decay))), np.finfo(float).tiny)
+    largest_decay = max(float(np.max(np.abs(modes.decay))), np.finfo(float).tiny)
     groups: list[list[int]] = []
     for k in range(len(modes.decay)):
         for group in groups:
             apart = abs(modes.frequency_squared[k] - modes.frequency_squared[group[0]])
-            if apart <= tolerance[k] and abs(modes.decay[k] - modes.decay[group[0]]) <= REPEATED * drag:
+            if apart <= tolerance[k] and abs(modes.decay[k] - modes.decay[group[0]]) <= REPEATED * largest_decay:
                 group.append(k)
                 break
         else:
@@ -102,19 +102,20 @@ def equal_modes(modes: RealModes) -> list[list[int]]:
 
 
 def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag: float) -> Sections:
-    """Rows of a first-order form, and of the free motion beside it."""
-    alone = []
+    """Rows of the free motion beside a first-order form, and of the form: a chain in doubles, else one in decimal
+    arithmetic, else one row for each pair of poles, whichever is nearest to the form's response."""
+    free_rows = []
     if form.free_residue:
         row = modal_row(0.0, 0.0, period, fraction, lag)
         row[2:] *= form.free_residue
-        alone.append([*row, 0.0])
-    unobserved = [motion_name(0.0, 0.0)] * (form.free_count - len(alone))
+        free_rows.append([*row, 0.0])
+    unobserved = [motion_name(0.0, 0.0)] * (form.free_count - len(free_rows))
     unobserved += [pole_name(pole) for pole in form.hidden_poles if pole.imag >= 0.0]
     # a chain shrinks slow motions, beside which what rounding leaves of a fast hidden one would not stay small
     form = without_hidden_poles(form)
     sampled = sample_form(form, period, fraction, lag)
     rows = form_rows(form, sampled, period)
-    m = len(rows)
+    m = len(rows)  # rows that are kept
     while m and _repeats(rows[m - 1], rows[: m - 1]):
         m -= 1
     unobserved += ["motion that decays as another one does"] * (len(rows) - m)
@@ -123,25 +124,25 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
     off = rows_error(chained, sampled)
     if off > KEPT_DIGITS and states is not None:
         exact = exact_rows(form, sampled, period)
-        own = np.column_stack([exact, np.arange(len(exact)) > 0])
-        if len(own) and rows_error(own, sampled) < off:
-            off, chained = rows_error(own, sampled), own
+        tried = np.column_stack([exact, np.arange(len(exact)) > 0])
+        if len(tried) and rows_error(tried, sampled) < off:
+            off, chained = rows_error(tried, sampled), tried
     if off > FEW_DIGITS:
         apart = separate_rows(form, period, fraction, lag)
-        own = np.column_stack([apart, np.zeros(len(apart))])
-        if len(own) and rows_error(own, sampled) < off:
-            off, chained, states = rows_error(own, sampled), own, None
+        tried = np.column_stack([apart, np.zeros(len(apart))])
+        if len(tried) and rows_error(tried, sampled) < off:
+            off, chained, states = rows_error(tried, sampled), tried, None
     if off > LOST_DIGITS:
         raise UnresolvedError(
             "the wall force moves so little that the sensor reads that rounding hides it: two ways to compute the "
             f"response differ by {100.0 * off:.2g} %; check actuator, sensor and the springs and dampers between"
         )
-    return Sections(np.vstack([np.array(alone).reshape(-1, 9), chained]), tuple(unobserved), states)
+    return Sections(np.vstack([np.array(free_rows).reshape(-1, 9), chained]), tuple(unobserved), states)
 
 
 def _repeats(row: Floats, earlier: Floats) -> bool:
-    """Whether a chain's row has the poles of an earlier one and adds nothing to it: two equal motions, of which
-    force and sensor see but one."""
+    """Whether a chain's row (8,) has the poles of an earlier one, (k, 8), and adds nothing to it: two equal
+    motions, of which force and sensor see but one."""
 
     def size(other: Floats) -> float:
         """Size of a row's numerators at |d| of the pole `rate`."""
@@ -157,7 +158,8 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
 
 
 def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints]:
-    """Rows (N, m, 9) of each plant, columns of `Sections.rows`, and how many are used (N,): 0 where reach is nan.
+    """Rows (N, m, 9) of N plants, columns of `Sections.rows`, and how many of each are used (N,): 0 where reach is
+    nan.
 
     controller  the same for all plants, or one of N designs for each
     """
@@ -195,7 +197,12 @@ def fill_rows(
     first: int,
     last: int,
 ) -> None:
-    """Fill in `rows` and `used` from the pole pairs (N, m) of plants first to last - 1; one period serves all."""
+    """Fill in `rows` (N, m, 9) and `used` (N,) of `section_rows` for plants first to last - 1.
+
+    decay, squared, position, velocity, reach  the attributes of `PolePairs`, (N, m), reach (N,)
+    periods, fractions, lags                   (N,), or (1,): that one serves all; [s], [samples], [s]
+    lagging                                    whether the force of any of the plants lags
+    """
     m = squared.shape[1]
     taken = np.empty(m, dtype=np.bool_)
     for i in range(first, last):
@@ -213,7 +220,7 @@ def fill_rows(
         for k in range(m):
             if taken[k]:
                 continue
-            x, v = position[i, k], velocity[i, k]
+            x, v = position[i, k], velocity[i, k]  # the section's shares in the reading
             for j in range(k + 1, m):
                 # pairs of one frequency and damping are one section with the sum of their shares: apart, rounding
                 # would leave a pole and a zero that nearly cancel

@@ -114,6 +114,7 @@ class WallMatrices:
         total = self.stiffness + self.damping
         if _is_diagonal(self.stiffness) and _is_diagonal(self.damping):
             moved = np.diag(total) > 0.0
+            # s, v: stiffness and damping of each combination, of which 1 is the sum otherwise
             S, s, v = np.eye(self.count)[moved], np.diag(self.stiffness)[moved], np.diag(self.damping)[moved]
         else:
             size, axes = np.linalg.eigh(total)
@@ -129,7 +130,8 @@ class WallMatrices:
 
 
 def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
-    """One matrix, its largest entry 1. Raises ArgumentError for what is no matrix of a law."""
+    """A matrix (count, count), its largest entry 1, from one number per direction or a matrix. Raises
+    ArgumentError, which `name` begins, for what is no matrix of a law."""
     wanted = (
         f"must be {count} numbers, one for each direction, or a matrix of {count} rows and columns"
         if count != 1
@@ -168,6 +170,7 @@ def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
 
 
 def _is_diagonal(matrix: Floats) -> bool:
+    """Whether all entries off the diagonal are exactly 0."""
     return bool(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)))
 
 

@@ -55,8 +55,8 @@ class Kalman:
 
     def alpha_beta(self, period: float) -> AlphaBeta:
         """The alpha-beta filter that this is at a sampling period [s]."""
-        u = self._share(period)
-        return AlphaBeta(u * (2.0 - u), 2.0 * u * u)
+        share = self._share(period)  # 1 - r, in which alpha = 1 - r^2 and beta = 2 (1 - r)^2
+        return AlphaBeta(share * (2.0 - share), 2.0 * share * share)
 
     def estimator(self, period: float) -> Estimator:
         """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""

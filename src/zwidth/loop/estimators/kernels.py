@@ -24,7 +24,7 @@ def foaw_estimate(memory: Floats, parameters: Floats, reading: float, period: fl
     """The velocity at a new reading; `Foaw` has the formulas.
 
     memory      (memory_size,)  zeros at first, changed in place; positions are counted from the first reading
-    parameters  (3,)            `Foaw.parameters`
+    parameters  (3,)            `Foaw.parameters`: N, d, and 1 for the best fit, 0 for the end fit
     reading     position [m]
     period      T [s]
     Returns     [m/s]; 0 at the first reading, over the readings there are as long as they are fewer than N + 1
@@ -45,7 +45,9 @@ def foaw_estimate(memory: Floats, parameters: Floats, reading: float, period: fl
 
 @compiled
 def _end_fit(memory: Floats, newest: int, periods: int, band: float) -> float:
-    """Slope per period of the longest line between two readings with all others within the band.
+    """Slope per period of the longest line from the newest reading to one before with all between within the band.
+
+    newest, periods  place in the memory of the newest reading, and most periods to look back;   band  d [m]
 
     A reading i periods old with a change c_i since lies within it for slopes from (c_i - d)/i to (c_i + d)/i; the
     slopes allowed by all readings passed are one interval, so that each window costs one comparison.
@@ -64,7 +66,8 @@ def _end_fit(memory: Floats, newest: int, periods: int, band: float) -> float:
 
 @compiled
 def _best_fit(memory: Floats, newest: int, periods: int, band: float) -> float:
-    """Slope per period of the least-squares line of the longest window that is within the band of it."""
+    """Slope per period of the least-squares line of the longest window that is within the band of it; arguments as
+    of `_end_fit`."""
     slope, total, moment = 0.0, 0.0, 0.0  # sums of c_i and of i c_i, c_i the change since i periods ago, negated
     for n in range(1, periods + 1):
         change = memory[newest - n] - memory[newest]
@@ -84,7 +87,7 @@ def levant_estimate(memory: Floats, parameters: Floats, reading: float, period: 
     """The velocity at a new reading; `Levant` has the formulas.
 
     memory      (memory_size,)  zeros at first, changed in place; positions are counted from the first reading
-    parameters  (2,)            `Levant.parameters`
+    parameters  (2,)            `Levant.parameters`: lambda0, lambda1
     reading     position [m]
     period      T [s]
     Returns     z1 [m/s], 0 at the first reading
@@ -93,6 +96,7 @@ def levant_estimate(memory: Floats, parameters: Floats, reading: float, period: 
         memory[FIRST_READING] = reading
     memory[READINGS] += 1.0
     position = reading - memory[FIRST_READING]
+    # lambda0 T, and lambda1 T, the most that the velocity changes in a sample
     brake, turn = period * parameters[0], period * parameters[1]
     ahead = memory[POSITION] + period * memory[VELOCITY] - position
     excess = abs(ahead) - period * turn
@@ -147,12 +151,14 @@ def velocity_of(method: VelocityMethod | Estimator, positions: ArrayLike, period
 
 @compiled
 def _run_foaw(memory: Floats, parameters: Floats, period: float, positions: Floats, velocities: Floats) -> None:
+    """Fill in velocities (N,) [m/s] at positions (N,) [m], by `foaw_estimate`."""
     for j in range(positions.size):
         velocities[j] = foaw_estimate(memory, parameters, positions[j], period)
 
 
 @compiled
 def _run_levant(memory: Floats, parameters: Floats, period: float, positions: Floats, velocities: Floats) -> None:
+    """Fill in velocities (N,) [m/s] at positions (N,) [m], by `levant_estimate`."""
     for j in range(positions.size):
         velocities[j] = levant_estimate(memory, parameters, positions[j], period)
 
@@ -161,7 +167,9 @@ def _run_levant(memory: Floats, parameters: Floats, period: float, positions: Fl
 def _run_linear(
     numerator: Floats, denominator: Floats, window: Floats, positions: Floats, velocities: Floats
 ) -> None:
-    """The factors one behind the other, each in powers of d = z - 1, then the window.
+    """Fill in velocities (N,) [m/s] at positions (N,) [m]: the factors one behind the other, then the window.
+
+    numerator, denominator, window  as of `Estimator`: rows of coefficients of d^2, d and 1, d = z - 1
 
     (c2 d^2 + c1 d + c0)/(d^2 + d1 d + d0), from u to y, has the states w1 and w2:
     y = c2 u + w1,  d w1 = w2 + c1 u - d1 y,  d w2 = c0 u - d0 y; a factor of lower degree has fewer of them.

@@ -79,7 +79,7 @@ class SavitzkyGolay:
 
 @lru_cache(maxsize=256)
 def _weights(n: int, order: int, centred: bool) -> tuple[float, ...]:
-    """Weights of the backward differences, newest first, each correctly rounded.
+    """Weights (n - 1) of the backward differences, newest first, each correctly rounded: running sums of the c_k.
 
     (m + 1) t_{m+1}(k) = (2 m + 1)(2 k - n + 1) t_m(k) - m (n^2 - m^2) t_{m-1}(k),      t_0 = 1
 
@@ -91,7 +91,7 @@ def _weights(n: int, order: int, centred: bool) -> tuple[float, ...]:
     before, here = [0] * n, [1] * n
     at = (Fraction(0), Fraction(1))  # t_{m-1}(s), t_m(s)
     slope = (Fraction(0), Fraction(0))
-    shares, sums = [], []
+    shares, sums = [], []  # of each m: -t_m'(s) / h_m, and the running sums of t_m(k) over k
     for m in range(order):
         a, b = 2 * m + 1, m * (n * n - m * m)
         before, here = here, [(a * (2 * k - n + 1) * here[k] - b * before[k]) // (m + 1) for k in ages]

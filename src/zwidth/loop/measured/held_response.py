@@ -64,11 +64,11 @@ def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Res
     _check_mass(operator)
     D = operator_stiffness(operator, port.theta / port.period)
     beyond = _aliases(port, operator)
-    change = _change(port.baseband, D)
+    change = _hand_change(port.baseband, D)
     held = response.value - change - beyond
     sweeps = None
     if port.sweeps:
-        sweeps = np.array([value - _change(base, D) - beyond for base, value in port.sweeps])
+        sweeps = np.array([value - _hand_change(base, D) - beyond for base, value in port.sweeps])
     error = _relative_error(port, D, change, held, beyond)
     # what a hand leaves of a far larger motion is the difference of two measured ones
     kept = (
@@ -142,8 +142,12 @@ def _note(response: Response, port: MeasuredPort, share: Floats, kept: Flags) ->
     return "; ".join(parts)
 
 
-def _change(base: Mapping[str, Complexes], D: Complexes) -> Complexes:
-    """X (...), what a hand of stiffness D (...) [N/m] takes off the response, from paths (...) by their names."""
+def _hand_change(base: Mapping[str, Complexes], D: Complexes) -> Complexes:
+    """X (...), what a hand of stiffness D (...) [N/m] takes off the response.
+
+    base  paths (...) by their names of `MeasuredPort`: "sh" to the sensor from the hand's force, "hh" to the
+          handle from it, "ha" to the handle from the command
+    """
     return np.asarray(base["sh"] * D / (1.0 + D * base["hh"]) * base["ha"])
 
 
@@ -156,8 +160,9 @@ def _aliases(port: MeasuredPort, operator: Operator) -> Complexes:
         D = operator_stiffness(operator, flat / port.period)
         path = {name: port.continued(name, flat) for name in ("sh", "ha", "hh")}
         path["ha"] = path["ha"] * port.model.hold(flat)
-        return _change(path, D).reshape(theta.shape)
+        return _hand_change(path, D).reshape(theta.shape)
 
+    # the nearest alias to either side is computed at each angle, the sum of the others as a Chebyshev series
     k = np.arange(2, FAR + 1)
     nodes = 0.5 * np.pi * (1.0 + chebyshev.chebpts1(NODES))
     turns = 2.0 * np.pi * np.concatenate([k, -k])
@@ -172,6 +177,8 @@ def _relative_error(
 ) -> Floats:
     """Relative standard deviation (n,) of a held response; 0 where no error of the paths is known.
 
+    change, held, beyond  (n,) X, the held response, and the aliases in it;   D  (n,) [N/m] of the hand
+
         dX/X = dG_eh/G_eh + d(W G_ha)/(W G_ha) - D G_hh/(1 + D G_hh) dG_hh/G_hh
 
     where paths that stem from one measurement err together.
@@ -182,10 +189,11 @@ def _relative_error(
     slopes: dict[str, Complexes] = {"sa": one}
     for name, factor in parts.items():
         source = port.origin[name]
-        own = base[name]
-        if name[1] != source[1]:
-            own = own * hold if source[1] == "a" else own / hold
-        slopes[source] = slopes.get(source, 0.0 * one) - change * factor / own
+        path = base[name]
+        if name[1] != source[1]:  # a path from the hand's force that stems from one of commands, or vice versa
+            path = path * hold if source[1] == "a" else path / hold
+        slopes[source] = slopes.get(source, 0.0 * one) - change * factor / path
+    # slopes: of the held response by each measured path
     square = np.zeros(len(held))
     if port.errors_known:
         square += (port.misfit * np.abs(beyond)) ** 2

@@ -67,7 +67,8 @@ class MeasuredPort:
         return any(bool(np.any(deviation > 0.0)) for deviation in self.deviations.values())
 
     def continued(self, name: str, theta: Floats) -> Complexes:
-        """The fitted response of a path at any angles, of commands before hold and delay."""
+        """The fitted response (k,) [m/N] of a path at angles (k,) of any size, of commands before hold and
+        delay."""
         return self.model.continuous(self.origin[name], theta)
 
     @cached_property
@@ -86,7 +87,7 @@ class MeasuredPort:
 
 
 def path_data(response: Response, period: float) -> PathData:
-    """The measured paths for `fit_poles`, frequencies left out that say nothing."""
+    """The measured paths for `fit_poles`, at the frequencies at which all of them are known."""
     paths = _paths(response)
     deviations = {name: relative_deviation(path, response.averages) for name, path in paths.items()}
     usable = [np.isfinite(deviations[n]) & np.isfinite(p.value) & (p.value != 0.0) for n, p in paths.items()]
@@ -148,8 +149,8 @@ def measured_port(response: Response, period: float) -> MeasuredPort:
     sampled, baseband, origin = _four_paths({n: p.value for n, p in paths.items()}, handle, model, theta)
     sweeps = []
     for k in range(0 if response.sweeps is None else len(response.sweeps)):
-        own, base, _ = _four_paths({n: _sweep(p, k) for n, p in paths.items()}, handle, model, theta)
-        sweeps.append((base, own["sa"]))
+        commanded, base, _ = _four_paths({n: _sweep(p, k) for n, p in paths.items()}, handle, model, theta)
+        sweeps.append((base, commanded["sa"]))
     return MeasuredPort(theta, period, sampled, baseband, deviations, origin, tuple(sweeps), model)
 
 
@@ -201,7 +202,7 @@ def changed_port(port: MeasuredPort, added_delay: float = 0.0, period: float | N
 
 def sweep_port(port: MeasuredPort, number: int) -> MeasuredPort:
     """The device as it was in one of its repeated sweeps, number from 0, the error of which is not known."""
-    base, value = port.sweeps[number]
+    base, value = port.sweeps[number]  # its four paths before sampling, and the sampled "sa"
     beyond = {name: port.sampled[name] - port.baseband[name] for name in port.sampled}
     return replace(
         port,
@@ -213,7 +214,7 @@ def sweep_port(port: MeasuredPort, number: int) -> MeasuredPort:
 
 
 def _paths(response: Response) -> dict[str, MeasuredPath]:
-    """The measured paths by name."""
+    """The measured paths by their names in `MeasuredPort`."""
     handle = response.handle
     paths = {"sa": MeasuredPath(response.value, response.coherence, response.sweeps)}
     if handle is None:
@@ -230,7 +231,8 @@ def _sweep(path: MeasuredPath, k: int) -> Complexes:
 def _four_paths(
     measured: Mapping[str, Complexes], handle: MeasuredHandle, model: PoleModel, theta: Floats
 ) -> tuple[dict[str, Complexes], dict[str, Complexes], dict[str, str]]:
-    """`sampled`, `baseband` and `origin` of a `MeasuredPort`, from what was measured and is the same place."""
+    """`sampled`, `baseband` and `origin` of a `MeasuredPort`: a path that was not measured is that of another one,
+    where handle, sensor and actuator are in one place, or by reciprocity."""
     hold = hold_response(theta, model.delay)
     origin = {name: name for name in measured}
     sampled = {name: measured[name] for name in ("sa", "ha") if name in measured}
@@ -250,5 +252,5 @@ def _four_paths(
 
 
 def _aliases(model: PoleModel, name: str, theta: Floats) -> Complexes:
-    """What the frequencies that look alike add to a path from commands, by its fitted modes."""
+    """What the frequencies that look alike add to a path (k,) from commands, by its fitted modes."""
     return model.sampled(name, theta) - model.continuous(name, theta) * model.hold(theta)

@@ -58,14 +58,14 @@ class ModalModel:
         terms: dict[str, Complexes] = {}
         values = {}
         for name in names:
-            sampled = name[1] == "a"
+            sampled = name[1] == "a"  # the second letter is the path's input
             if name[1] not in terms:
                 poles = self._eigen[0]
-                own = sampled_terms(poles, theta, self.delay) if sampled else continuous_terms(poles, theta)
+                of_input = sampled_terms(poles, theta, self.delay) if sampled else continuous_terms(poles, theta)
                 if self.free:
                     mass = sampled_free_mass(theta, self.delay) if sampled else -1.0 / theta**2 + 0j
-                    own = np.concatenate([mass[:, None], own], axis=1)
-                terms[name[1]] = own
+                    of_input = np.concatenate([mass[:, None], of_input], axis=1)
+                terms[name[1]] = of_input
             values[name] = np.asarray(terms[name[1]] @ self._residues(name))
         return values
 
@@ -82,13 +82,14 @@ class ModalModel:
         return poles.astype(complex), shapes[:n].astype(complex), into.astype(complex)
 
     def _residues(self, name: str) -> Complexes:
-        """Residues of a path, that of 1/s² first where it stands apart."""
+        """Residues (2n,) of a path by its name, one of PATHS; that of 1/s² in front of them where it stands
+        apart."""
         read = self.sensor if name[0] == "s" else self.handle
         push = self.actuator if name[1] == "a" else self.handle
         first = int(self.free)
         _, shapes, into = self._eigen
-        own = (read[first:] @ shapes) * (into @ push[first:])
-        return np.append(read[0] * push[0], own) if self.free else own
+        residues = (read[first:] @ shapes) * (into @ push[first:])
+        return np.append(read[0] * push[0], residues) if self.free else residues
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def fit_plant(response: Response, period: float) -> PlantFit:
     poles = fit_poles(data)
     at_sensor = known and handle is not None and handle.at_sensor
     tied = known and handle is not None and handle.actuator_at_sensor
-    model = _refined(data.thinned(POINTS), _start(data, poles, at_sensor, tied), at_sensor, tied)
+    model = _fitted(data.thinned(POINTS), _first_model(data, poles, at_sensor, tied), at_sensor, tied)
     value = model.paths(["sa"], data.theta)["sa"]
     deviation = np.abs(value / data.values["sa"] - 1.0)
     below = data.theta < 0.95 * np.pi  # at half the rate a free mass answers with next to nothing
@@ -150,26 +151,30 @@ def fit_plant(response: Response, period: float) -> PlantFit:
     return PlantFit(plant, model.delay * period, misfit, float(deviation[worst]), float(frequency), noise)
 
 
-def _start(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) -> ModalModel:
-    """The model of these poles, with residues of the paths by least squares and dampers that couple no modes."""
+def _first_model(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) -> ModalModel:
+    """The model of these poles, with residues of the paths by least squares and dampers that couple no modes.
+
+    at_sensor, tied  whether the handle, and the actuator, is where the sensor is
+    """
     poles, delay, residues = found.modes, found.delay, {}
     for name, value in data.values.items():
         own_atoms = mode_atoms(poles, found.free, data.theta, delay if name[1] == "a" else None)
         atoms = stacked(own_atoms[:, : len(poles) + found.free], data.deviations[name])
         scale = np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
-        own = stacked(value, data.deviations[name])
-        residues[name] = np.linalg.lstsq(atoms / scale, own, rcond=1e-11)[0] / scale
+        target = stacked(value, data.deviations[name])
+        residues[name] = np.linalg.lstsq(atoms / scale, target, rcond=1e-11)[0] / scale
     free = data.integrators == 2
     n = len(poles) + free
     squared, damping = np.zeros(n), np.zeros((n, n))
     for i, (w, ratio) in enumerate(poles, start=int(free)):
         squared[i] = w**2
         damping[i, i] = 2.0 * w * ratio if w > 0.0 else ratio
-    return ModalModel(squared, damping, *_shapes(residues, at_sensor, tied), delay, free)
+    return ModalModel(squared, damping, *_ends_of_modes(residues, at_sensor, tied), delay, free)
 
 
-def _shapes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tuple[Floats, Floats, Floats]:
-    """Actuator, sensor and handle (n,) of modes that explain the residues of all paths about as well."""
+def _ends_of_modes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tuple[Floats, Floats, Floats]:
+    """Actuator, sensor and handle (n,) of n modes whose products explain the residues (n,) of all paths about as
+    well. at_sensor, tied: `_first_model`."""
     sa, sh, ha, hh = (residues.get(name) for name in PATHS)
     assert sa is not None
 
@@ -193,8 +198,9 @@ def _shapes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tupl
     return a, s, h
 
 
-def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> ModalModel:
-    """The model whose numbers `_numbers_of_model` fit the data by least squares, begun from `start`."""
+def _fitted(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> ModalModel:
+    """The model whose numbers `_numbers_of_model` fit the data by least squares, begun from `start`: itself where
+    the numbers are more than the data. at_sensor, tied_ends: as `_first_model`'s at_sensor and tied."""
     from scipy.optimize import approx_fprime, least_squares
 
     unpack = partial(_model_of_numbers, data, start, at_sensor, tied_ends)
@@ -219,15 +225,15 @@ def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool
 def _model_of_numbers(
     data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool, x: Floats
 ) -> ModalModel:
-    """Return the model of the numbers (q,) that are fitted, laid out as by `_numbers_of_model`; the rest is that
+    """Return the model of the numbers x (q,) that are fitted, laid out as by `_numbers_of_model`; the rest is that
     of the start."""
     n, first = len(start.squared), int(start.free)
     m = n - first
     rows, columns = np.tril_indices(m)
-    tied = start.squared[first:] == 0.0
+    springless = start.squared[first:] == 0.0
     squared = np.zeros(n)
-    squared[first:] = np.where(tied, 0.0, np.exp(np.clip(2.0 * x[:m], -200.0, 20.0)))
-    factor = np.zeros((m, m))
+    squared[first:] = np.where(springless, 0.0, np.exp(np.clip(2.0 * x[:m], -200.0, 20.0)))
+    factor = np.zeros((m, m))  # of the damping, which so never gives power
     factor[rows, columns] = x[m : m + len(rows)]
     damping = np.zeros((n, n))
     damping[first:, first:] = factor @ factor.T
@@ -251,9 +257,9 @@ def _numbers_of_model(data: PathData, start: ModalModel, at_sensor: bool, tied_e
     lower triangle of the damping's factor, the sensor, and as far as they are free actuator, handle and delay."""
     first = int(start.free)
     rows, columns = np.tril_indices(len(start.squared) - first)
-    tied = start.squared[first:] == 0.0
+    springless = start.squared[first:] == 0.0
     diagonal = np.diag(np.sqrt(np.maximum(np.diag(start.damping)[first:], 1e-12)))
-    x0 = [0.5 * np.log(np.where(tied, 1.0, start.squared[first:])), diagonal[rows, columns], start.sensor]
+    x0 = [0.5 * np.log(np.where(springless, 1.0, start.squared[first:])), diagonal[rows, columns], start.sensor]
     if not tied_ends:
         x0.append(start.actuator)
     if "sh" in data.values and not at_sensor:

@@ -52,7 +52,7 @@ class PathData:
     delay: float | None
 
     def thinned(self, most: int) -> PathData:
-        """The data at evenly spread points, at most `most` of them."""
+        """The data at every n-th point, at most `most` of them."""
         every = slice(None, None, max(1, -(-len(self.theta) // most)))
         return replace(
             self,
@@ -100,7 +100,8 @@ class PoleModel:
         # atoms of 1/s² first, then those of 1/s
         squared = int(self.free) + len(modes)
         residues = {
-            name: np.append(own[:squared] * ratio**2, own[squared:] * ratio) for name, own in self.residues.items()
+            name: np.append(values[:squared] * ratio**2, values[squared:] * ratio)
+            for name, values in self.residues.items()
         }
         return replace(self, modes=modes, residues=residues, delay=self.delay / ratio + added_delay)
 
@@ -119,17 +120,19 @@ def fit_poles(data: PathData) -> PoleModel:
     for name, value in data.values.items():
         atoms = stacked(_path_atoms(data, name, modes, delay), data.deviations[name])
         scale = np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
-        own = stacked(value, data.deviations[name])
-        residues[name] = np.linalg.lstsq(atoms / scale, own, rcond=1e-11)[0] / scale
-        rest.append(own - atoms @ residues[name])
+        target = stacked(value, data.deviations[name])
+        residues[name] = np.linalg.lstsq(atoms / scale, target, rcond=1e-11)[0] / scale
+        rest.append(target - atoms @ residues[name])
     misfit = float(np.sqrt(np.mean(np.concatenate(rest) ** 2)))
     spread = 0.0 if data.delay is not None else _delay_deviation(data, modes, delay, misfit)
     return PoleModel(modes, delay, data.integrators == 2, residues, misfit, spread)
 
 
 def _search(data: PathData) -> tuple[float, float, Floats]:
-    """Misfit, delay and modes of the best of searches from several delays."""
+    """Misfit, delay and modes of the best of searches from several delays, each with a mode more than before until
+    two in a row explain nothing."""
     first = np.array([[0.0, 10.0 * data.theta[0]]]) if data.integrators == 1 else np.zeros((0, 2))
+    # all are (misfit, delay, modes)
     states = [(np.inf, delay, first) for delay in (DELAYS if data.delay is None else (data.delay,))]
     if data.integrators:
         states = _until_exact(data, [(modes, delay) for _, delay, modes in states])
@@ -144,19 +147,20 @@ def _search(data: PathData) -> tuple[float, float, Floats]:
 
 
 def _until_exact(data: PathData, starts: Sequence[tuple[Floats, float]]) -> list[tuple[float, float, Floats]]:
-    """Searches from these modes and delays, up to the first after which nothing is left."""
+    """(Misfit, delay, modes) of searches from starts (modes, delay), up to the first that misses less than
+    EXACT."""
     found: list[tuple[float, float, Floats]] = []
     for modes, delay in starts:
-        found.append(_refined(data, modes, delay))
+        found.append(_refined_with_misfit(data, modes, delay))
         if found[-1][0] < EXACT:
             break
     return found
 
 
-def _refined(data: PathData, modes: Floats, delay: float) -> tuple[float, float, Floats]:
-    """Misfit, delay and modes after `_refine`."""
+def _refined_with_misfit(data: PathData, modes: Floats, delay: float) -> tuple[float, float, Floats]:
+    """Misfit, delay and modes (n, 2) after `_refine`, from modes and a delay."""
     modes, delay = _refine(data, modes, delay)
-    return float(np.sqrt(np.mean(_left(data, modes, delay) ** 2))), delay, modes
+    return float(np.sqrt(np.mean(_unexplained(data, modes, delay) ** 2))), delay, modes
 
 
 def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) -> Complexes:
@@ -165,6 +169,7 @@ def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) ->
     First the free mass, 1/s², then each mode, 1/((s - s1)(s - s2)), then these times s, less that of the first:
     all of them together fall like 1/s².
 
+    modes  (n, 2) and free as of `PoleModel`;   theta  (k,) angles
     delay  of commands, sampled behind a hold; None: continuous
     """
     parts = []
@@ -177,6 +182,7 @@ def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) ->
         root = np.sqrt((rate**2 - w**2).astype(complex))
         nearest = 1e-7 * np.maximum(w, rate)  # two equal poles are taken as little apart
         root = np.where(np.abs(root) < nearest, nearest, root)
+        # the roots of s² + 2 rate s + w², 0 and -ratio of a mass on a dashpot
         s1, s2 = np.where(w == 0.0, 0.0, -rate + root), -rate - root
         both = np.concatenate([s1, s2])
         terms = continuous_terms(both, theta) if delay is None else sampled_terms(both, theta, delay)
@@ -192,27 +198,28 @@ def _path_atoms(data: PathData, name: str, modes: Floats, delay: float) -> Compl
 
 
 def stacked(values: Complexes, deviation: Floats) -> Floats:
-    """Weighted real and imaginary parts (2k, ...)."""
+    """Real, then imaginary parts (2k, ...) of values (k, ...), each over its standard deviation (k,)."""
     weighted = values / deviation.reshape(-1, *[1] * (values.ndim - 1))
     return np.concatenate([weighted.real, weighted.imag])
 
 
 def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats, Floats]]:
-    """Orthonormal basis of each path's atoms, and what they leave of its values, weighted and stacked."""
+    """Of each path, in the order of the data: an orthonormal basis (2k, r) of its atoms, and what they leave (2k,)
+    of its values, both weighted and `stacked`."""
     parts = []
-    inputs = {name[1]: name for name in data.values}
-    of_input = {own: _path_atoms(data, name, modes, delay) for own, name in inputs.items()}
+    inputs = {name[1]: name for name in data.values}  # any path from each input: atoms hang on it alone
+    of_input = {letter: _path_atoms(data, name, modes, delay) for letter, name in inputs.items()}
     for name, value in data.values.items():
         atoms = stacked(of_input[name[1]], data.deviations[name])
         atoms = atoms / np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
         basis = np.linalg.qr(atoms)[0] if atoms.shape[1] else atoms
-        own = stacked(value, data.deviations[name])
-        parts.append((basis, own - basis @ (basis.T @ own)))
+        target = stacked(value, data.deviations[name])
+        parts.append((basis, target - basis @ (basis.T @ target)))
     return parts
 
 
-def _left(data: PathData, modes: Floats, delay: float) -> Floats:
-    """What the atoms leave of all paths' values, weighted, in a row."""
+def _unexplained(data: PathData, modes: Floats, delay: float) -> Floats:
+    """What the atoms of these modes leave of all paths' values, weighted, in one row (2k paths,)."""
     return np.concatenate([rest for _, rest in _projected(data, modes, delay)])
 
 
@@ -238,20 +245,21 @@ def _refine(data: PathData, modes: Floats, delay: float) -> tuple[Floats, float]
         return modes, delay
     x0 = np.clip(x0, low + 1e-9, high - 1e-9)
     found = least_squares(
-        lambda x: _left(data, *unpack(x)), x0, bounds=(low, high), max_nfev=STEPS, x_scale=0.1, ftol=1e-5
+        lambda x: _unexplained(data, *unpack(x)), x0, bounds=(low, high), max_nfev=STEPS, x_scale=0.1, ftol=1e-5
     )
     return unpack(found.x)
 
 
 def _delay_deviation(data: PathData, modes: Floats, delay: float, misfit: float) -> float:
-    """Standard deviation of the fitted delay [samples], that of all other numbers counted in."""
-    base, columns = _left(data, modes, delay), []
+    """Standard deviation of the fitted delay [samples]: the misfit over the part of its slope that no change of
+    the modes' numbers makes up for."""
+    base, columns = _unexplained(data, modes, delay), []
     for i in range(modes.size):
         if modes.flat[i] > 0.0:
             changed = modes.copy()
             changed.flat[i] *= 1.0 + STEP
-            columns.append((_left(data, changed, delay) - base) / STEP)
-    late = (_left(data, modes, delay + STEP) - base) / STEP
+            columns.append((_unexplained(data, changed, delay) - base) / STEP)
+    late = (_unexplained(data, modes, delay + STEP) - base) / STEP
     if columns:
         others = np.array(columns).T
         others /= np.maximum(np.linalg.norm(others, axis=0), 1e-300)
@@ -265,18 +273,20 @@ def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
     """The modes (n + 1, 2) with the one more that takes most of what the n modes leave of the data."""
     parts = _projected(data, modes, delay)
     k = len(data.theta)
+    # power per angle that is left, at whose peaks modes are tried beside a grid of angles
     left = np.sum([rest[:k] ** 2 + rest[k:] ** 2 for _, rest in parts], axis=0)
     inner = np.flatnonzero((left[1:-1] >= left[:-2]) & (left[1:-1] >= left[2:])) + 1
     peaks = data.theta[inner[np.argsort(-left[inner])[:PEAKS]]]
     w = np.concatenate([np.geomspace(data.theta[0], HIGHEST, TRIED), peaks])
-    tried = np.array([(a, r) for a in w for r in RATIOS])
+    tried = np.array([(angle, ratio) for angle in w for ratio in RATIOS])
     gain = np.zeros(len(tried))
     for (basis, rest), name in zip(parts, data.values, strict=True):
-        own = mode_atoms(tried, False, data.theta, delay if name[1] == "a" else None)[:, : len(tried)]
-        atoms = stacked(own, data.deviations[name])
+        first = mode_atoms(tried, False, data.theta, delay if name[1] == "a" else None)[:, : len(tried)]
+        atoms = stacked(first, data.deviations[name])
         whole = np.einsum("ij,ij->j", atoms, atoms)
         atoms -= basis @ (basis.T @ atoms)
         size = np.einsum("ij,ij->j", atoms, atoms)
+        # what a projection on one atom more takes off the square of the rest
         gain += np.where(size > 1e-16 * whole, (rest @ atoms) ** 2 / np.maximum(size, 1e-300), 0.0)
     return np.vstack([modes, tried[np.argmax(gain)]])
 
@@ -292,7 +302,7 @@ def continuous_terms(poles: Complexes, theta: Floats) -> Complexes:
 
 
 def sampled_terms(poles: Complexes, theta: Floats, delay: float) -> Complexes:
-    """1/(jw - s) behind hold and delay, as sampled, (k, n).
+    """1/(jw - s) behind hold and delay [samples], as sampled, (k, n), of poles s (n,) at angles (k,).
 
     z^-l [E(1 - f) + e^(s (1 - f)) E(f)/z]/(z - e^s),      E(t) = (e^(s t) - 1)/s,   delay = l + f
     """
@@ -307,10 +317,11 @@ def sampled_terms(poles: Complexes, theta: Floats, delay: float) -> Complexes:
 
 
 def sampled_free_mass(theta: Floats, delay: float) -> Complexes:
-    """1/s² behind hold and delay, as sampled (k,)."""
+    """1/s² behind hold and delay [samples], as sampled (k,) at angles (k,)."""
     whole = floor(delay)
     f = delay - whole
     z, d = np.exp(1j * theta), np.expm1(1j * theta)
+    # place and speed that the new force leaves after a period, in which it acts for 1 - f, and the old one
     new, old = np.array([(1.0 - f) ** 2 / 2.0, 1.0 - f]), np.array([f * (1.0 - f / 2.0), f])
     place, speed = new[0] + old[0] / z, new[1] + old[1] / z
     return np.asarray(z**-whole * (place / d + speed / d**2))
