@@ -101,7 +101,7 @@ def random_job(kind, seed, size):
 
 
 def alone(job):
-    found = [[job._alone(n, one) for one in job.columns] for n in range(job.count)]
+    found = [[job._found_alone(n, one) for one in job.columns] for n in range(job.count)]
     return np.array([[one[0] for one in row] for row in found]), np.array(
         [[one[1] for one in row] for row in found]
     )
@@ -147,7 +147,7 @@ def wall_job(kind, seed, size):
 def test_walls_of_designs_decay_as_each_alone(kind, seed):
     job = wall_job(kind, seed, 40)
     together = job.compute(0, job.count)
-    cells = [[job._alone(n, one) for one in job.columns] for n in range(job.count)]
+    cells = [[job._found_alone(n, one) for one in job.columns] for n in range(job.count)]
     assert together.status.tolist() == [[status for _, status, _ in row] for row in cells]
     np.testing.assert_allclose(together.values, [[value for value, _, _ in row] for row in cells], rtol=1e-9)
     for column, notes in enumerate(together.notes):
@@ -214,7 +214,7 @@ def test_valid_designs_are_not_asked_for_alone(monkeypatch):
         40,
         ("stiffness_max", "stable_area"),
     )
-    monkeypatch.setattr(SweepJob, "_alone", lambda *_: pytest.fail("asked for alone"))
+    monkeypatch.setattr(SweepJob, "_found_alone", lambda *_: pytest.fail("asked for alone"))
     assert (job.compute(0, job.count).status == OK).all()
 
 
@@ -246,8 +246,10 @@ def test_designs_out_of_reach_are_told_together(fastest, monkeypatch):
     job = job_of("five-bar", axes, None, ("stiffness_max", "isotropy"))
     values, status = alone(replace(job, _cache={}))
     asked = []
-    one = SweepJob._alone
-    monkeypatch.setattr(SweepJob, "_alone", lambda self, number, _: asked.append(number) or one(self, number, _))
+    one = SweepJob._found_alone
+    monkeypatch.setattr(
+        SweepJob, "_found_alone", lambda self, number, _: asked.append(number) or one(self, number, _)
+    )
     together = job.compute(0, job.count)
     assert np.array_equal(together.status, status)
     np.testing.assert_allclose(together.values, values, rtol=1e-9)
@@ -259,7 +261,7 @@ def test_designs_out_of_reach_are_told_together(fastest, monkeypatch):
 def test_a_position_out_of_reach_of_the_only_mechanism_is_told_of_all_designs(monkeypatch):
     job = job_of("five-bar", (Axis("loop.sampling_period_s", (5e-4, 1e-3)),), None, ("stiffness_max", "isotropy"))
     job = replace(job, fixed_circumstances={"at": (0.5, 0.5)})
-    monkeypatch.setattr(SweepJob, "_alone", lambda *_: pytest.fail("asked for alone"))
+    monkeypatch.setattr(SweepJob, "_found_alone", lambda *_: pytest.fail("asked for alone"))
     assert (job.compute(0, job.count).status == OUT_OF_REACH).all()
 
 

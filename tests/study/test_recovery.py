@@ -228,6 +228,6 @@ def alive(process: str) -> bool:
 
 def test_pieces_cover_a_range():
     for first, last in ((0, 1), (3, 5), (0, 8), (5, 100)):
-        pieces = workers._cut(first, last)
+        pieces = workers._cut_in_pieces(first, last)
         assert [n for piece in pieces for n in range(*piece)] == list(range(first, last))
         assert len(pieces) <= workers.PIECES

@@ -143,17 +143,17 @@ def bending(device: Device, point: OperatingPoint | None = None) -> Bending | No
     tubes = () if beams else typical_tubes(device)
     if not (beams or tubes):
         return None
-    own = _bending_numbers(point)
+    as_described = _bending_numbers(point)
     other = with_rigid_links(device) if beams else with_tubes(device, tubes)
     try:
         changed = _bending_numbers(_placed_like(other, device, point))
     except EquilibriumError as error:
         changed = BendingNumbers(None, nan, nan, f"no equilibrium: {error}")
     if beams:
-        return Bending(beams, (), (), own, changed).about(point)
+        return Bending(beams, (), (), as_described, changed).about(point)
     links = tuple(tube.link for tube in tubes)
     kept = tuple(link["name"] for link in _links(device) if _length(link) > 0.0 and link["name"] not in links)
-    return Bending(links, tubes, kept, changed, own).about(point)
+    return Bending(links, tubes, kept, changed, as_described).about(point)
 
 
 def _placed_like(other: Device, device: Device, point: OperatingPoint) -> OperatingPoint:
@@ -210,7 +210,7 @@ def typical_tubes(device: Device) -> tuple[Tube, ...]:
     joint is revolute, prismatic or fixed. In legs each is named as it is written."""
     mechanism, document = device.mechanism, table(device.document, "mechanism")
     assert mechanism is not None
-    copies: dict[Any, str] = {}
+    copies: dict[Any, str] = {}  # path of a link as it is written -> name of its first copy in the mechanism
     for member in members(document, "links"):
         copies.setdefault(member.path, member.entry["name"])
     ratio = 0.0 if _damps_bending(device.damping) else DAMPING
@@ -219,7 +219,8 @@ def typical_tubes(device: Device) -> tuple[Tube, ...]:
 
 
 def _damps_bending(damping: Damping) -> bool:
-    """Whether a file's damping is that of all flexible modes, those of links among them."""
+    """Whether a file's damping damps all flexible modes, those of links among them; False for one of the drives
+    alone."""
     if isinstance(damping, ModalDamping):
         return float(damping.ratio) > 0.0
     return isinstance(damping, ProportionalDamping) and float(damping.stiffness_coefficient_s) > 0.0
@@ -228,6 +229,7 @@ def _damps_bending(damping: Damping) -> bool:
 def _tube(mechanism: Mechanism, name: str, link: dict[str, Any], ratio: float) -> Tube | None:
     """The link of that name in the mechanism as a tube; None if it can be none.
 
+    link   its table in the device file
     ratio  of damping that the tube has in its first vibration, clamped at its base
     """
     length, mass = _length(link), link.get("mass_kg", 0.0)
@@ -236,12 +238,12 @@ def _tube(mechanism: Mechanism, name: str, link: dict[str, Any], ratio: float) -
     index, material = mechanism.links.names.index(name), typical_material(MATERIAL)
     share = SHARE
     while share >= LEAST_SHARE:
-        # rho pi (D^2 - (D - 2 t)^2) / 4 L with t = WALL D
+        # outer diameter D of a tube of this mass, rho pi (D^2 - (D - 2 t)^2) / 4 L with a wall t = WALL D
         D = sqrt(share * mass / (material.density * length * pi * WALL * (1.0 - WALL)))
         beam = beam_properties(length, tube_section(D, WALL * D), material)
-        slowest = FIRST_ROOT**2 / length**2 * sqrt(beam.EI_y / beam.mass_per_length)
-        time = 2.0 * ratio / slowest
-        with suppress(BeamError):
+        slowest = FIRST_ROOT**2 / length**2 * sqrt(beam.EI_y / beam.mass_per_length)  # of a cantilever [rad/s]
+        time = 2.0 * ratio / slowest  # a damping of `time` times the stiffness has this ratio at `slowest`
+        with suppress(BeamError):  # the link's inertia leaves no room for the tube's
             carried_body(mechanism, index, beam, _known_axis(link))
             if D / length <= THICKEST:
                 return Tube(link["name"], length, D, WALL * D, share, time)
@@ -259,7 +261,7 @@ def _known_axis(link: dict[str, Any]) -> Floats | None:
 
 def _bending_numbers(point: OperatingPoint) -> BendingNumbers:
     """The numbers of a device at an operating point. Raises what `OperatingPoint.loop` raises."""
-    first = _first_moved(point.ungripped_plant)
+    first = _first_moved_frequency(point.ungripped_plant)
     chart, reason = None, ""
     try:
         chart = stability_chart(point.loop, decay=False).about(point).drawn()
@@ -270,7 +272,7 @@ def _bending_numbers(point: OperatingPoint) -> BendingNumbers:
     return BendingNumbers(chart, float(point.effective.stiffness), first, reason)
 
 
-def _first_moved(plant: Plant) -> float:
+def _first_moved_frequency(plant: Plant) -> float:
     """Lowest natural frequency of a mode that has more than the share MOVED of the motion that a force of the wall
     makes at the sensor [Hz]; nan if there is none."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)

@@ -245,7 +245,7 @@ def load_path(
 
 
 def without_push(load: Load | None) -> Load | None:
-    """What is left of a load where the hand does not push; None: nothing that acts."""
+    """A load without the hand's force: its weight alone; None where that is nothing."""
     if load is None or not np.any(load.weight):
         return None
     return replace(load, force=None, moment=None, push=None, settle=False)
@@ -255,8 +255,10 @@ def without_push(load: Load | None) -> Load | None:
 class _Pushes:
     """The charts of a device in one posture under pushes of the hand.
 
-    bare  the device without load;   here  its operating point
-    load  whose push is replaced;    kept  what is left of it without one
+    bare  the device without load
+    here  operating point of `bare` in the posture and direction of all charts
+    load  whose push is replaced by each of the pushes
+    kept  the load without a push; None: nothing acts then
     """
 
     bare: Device
@@ -273,15 +275,16 @@ class _Pushes:
         return cls(bare, here, load or Load(), without_push(load))
 
     def under(self, push: float) -> Device:
-        """The device under a push, and all else of the load."""
+        """The device under a push [N] along the direction and all else of the load."""
         if not push:
             return self.bare if self.kept is None else self.bare.under(self.kept)
         force = push * np.asarray(self.here.direction)[:3] if self.load.settle else None
-        own = None if self.load.settle else push
-        return self.bare.under(replace(self.load, force=force, moment=None, push=own))
+        along = None if self.load.settle else push  # a load that settles gives the whole force as a vector
+        return self.bare.under(replace(self.load, force=force, moment=None, push=along))
 
     def chart(self, push: float) -> PushedChart:
-        """The chart under a push, and what else is known of it."""
+        """The chart under a push [N], with its sideways motion and the other two largest stiffnesses; without an
+        equilibrium or a chart a status that says why."""
         device = self.under(push)
         try:
             point = device.at_point(self.here)
@@ -307,7 +310,7 @@ class _Pushes:
         axis = screw(self.here.direction)
         if np.any(axis[3:]):
             return nan, NOT_ALONG_A_DIRECTION
-        posture, why = self.here.posture, ""
+        posture, why = self.here.posture, ""  # why: of the last stiffness tried
         assert posture is not None
 
         def excess(log_stiffness: float) -> float:
@@ -344,18 +347,20 @@ def _balanced_stiffness(excess: Callable[[float], float], near: float) -> tuple[
 
     Returns  the stiffness, or None where there is none, and the logarithm of the smallest one tried
     """
+    # upwards to a stiffness that is too large
     high = low = log(near) + START
     for _ in range(STEPS):
-        off = excess(high)
-        if off <= 0.0:
+        ratio = excess(high)
+        if ratio <= 0.0:
             break
         high += STEP
-    for _ in range(STEPS if off > -inf else 0):
+    # downwards to one that is too small, then between the two
+    for _ in range(STEPS if ratio > -inf else 0):
         low = high - STEP
-        off = excess(low)
-        if off >= 0.0:
+        ratio = excess(low)
+        if ratio >= 0.0:
             return exp(float(brentq(excess, low, high, xtol=SETTLED))), low
-        if off == -inf:
+        if ratio == -inf:
             break
         high = low
     return None, low

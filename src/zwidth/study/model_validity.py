@@ -159,17 +159,17 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
         at_once = max(1, MOST_PLACES // len(points))
         for first in range(0, len(walls), at_once):
             some = slice(first, first + at_once)
-            best[some] = np.minimum(best[some], _nearest(points / walls[some, None] - 1.0))
+            best[some] = np.minimum(best[some], _least_maximum(points / walls[some, None] - 1.0))
     return best
 
 
-def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
+def _relative_errors(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
     """e of each wall (k, 3) from the edge of a model's chart, as `edge_distance`; where the model's wall at the
     same frequency is near, from points of its exact curve: chords are too coarse for small walls.
 
     tracer  of the model's loop
     """
-    in_radians = 2.0 * pi * chart.loop.period
+    in_radians = 2.0 * pi * chart.loop.period  # angle of a root on the circle, per sample, over its frequency
     ranges = [(float(arc.frequency.min()), float(arc.frequency.max())) for arc in chart.boundary]
     best = edge_distance(walls, chart)
     for n, wall in enumerate(walls):
@@ -181,12 +181,13 @@ def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
             if error < NEAR:
                 frequencies = [f for f in frequency * (1.0 + error * CLOSE) if low < f < high]
                 points = np.array([(*tracer.wall(in_radians * f)[:2], f) for f in frequencies])
-                best[n] = float(_nearest(points / wall - 1.0))
+                best[n] = float(_least_maximum(points / wall - 1.0))
     return best
 
 
-def _nearest(points: Floats) -> Floats:
-    """Least max(|u|, |v|, ...) along each polyline (...,) through points (..., k, n); inf where it has no piece.
+def _least_maximum(points: Floats) -> Floats:
+    """Least max(|u|, |v|, ...) along each polyline (...,) through k points (..., k, n) with n coordinates u, v,
+    ...; inf where it has no piece.
 
     Along each straight piece it is convex, and least at an end, where one of u, v, ... is 0, or where two of them
     are equal or opposite.
@@ -195,13 +196,13 @@ def _nearest(points: Floats) -> Floats:
     pairs = list(combinations(range(points.shape[-1]), 2))
     first, second = (np.array(one, dtype=np.int64) for one in zip(*pairs, strict=True))
     ends = np.broadcast_to((0.0, 1.0), (*start.shape[:-1], 2))
-    # where these are 0 along the piece: each alone, the differences, the sums
-    a, b = (
+    # each coordinate, the differences, the sums: their values at the start, and by how much they change
+    at_start, change = (
         np.concatenate([one, one[..., first] - one[..., second], one[..., first] + one[..., second]], axis=-1)
         for one in (start, step)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        places = np.concatenate([ends, -a / b], axis=-1)
+        places = np.concatenate([ends, -at_start / change], axis=-1)  # shares of the piece at which they are 0
     places = np.clip(np.nan_to_num(places, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
     largest = np.abs(start[..., 0, None] + places * step[..., 0, None])
     for n in range(1, points.shape[-1]):
@@ -221,6 +222,7 @@ class _Edge:
         nyquist = 0.5 / chart.loop.period
         arcs = [arc for arc in chart.boundary if np.ptp(arc.frequency) > 0.0]
         extents = [[np.max(np.abs(arc.stiffness)), np.max(np.abs(arc.damping))] for arc in arcs]
+        # K and B that are not negligible (2,)
         self.least = NEGLIGIBLE * np.max(extents, axis=0, initial=0.0) if arcs else np.zeros(2)
         points = [np.column_stack([arc.stiffness, arc.damping, arc.frequency]) for arc in arcs]
         points = [self._within(arc[(arc[:, 2] > 0.0) & (arc[:, 2] < nyquist)]) for arc in points]
@@ -231,8 +233,8 @@ class _Edge:
         self.arc = np.repeat(np.arange(len(arcs)), [len(arc) for arc in points])[order]
 
     def _within(self, points: Floats) -> Floats:
-        """The points of one arc whose K and B are not negligible, and between them and the others the last such
-        wall, so that the ends hang on the curve and not on where its points happen to lie."""
+        """The points (k, 3) of one arc, K, B and frequency, whose K and B are not negligible; and at each end of
+        them the last such wall of the curve, so that the ends do not hang on where the points happen to lie."""
         inside = np.all(points[:, :2] > self.least, axis=1)
         ends = []
         for n in np.flatnonzero(np.diff(inside)):
@@ -251,7 +253,10 @@ class _Edge:
 def _fit(
     edge: _Edge, controller: Controller, key: str, label: str, plant: Plant | None, reason: str, tolerance: float
 ) -> ModelFit:
-    """How one model fits the full one along its edge; `reason` says why it has no plant."""
+    """How one model fits the full one along its edge.
+
+    plant   of the model; None: it does not apply, for the reason `reason`
+    """
     none = np.empty(0)
     if plant is None:
         return ModelFit(key, label, none, none, (), reason)
@@ -262,9 +267,9 @@ def _fit(
         return ModelFit(key, label, none, none, (), str(problem))
 
     def fits(frequency: float) -> bool:
-        return bool(_error(edge.wall(frequency), chart, tracer)[0] <= tolerance)
+        return bool(_relative_errors(edge.wall(frequency), chart, tracer)[0] <= tolerance)
 
-    error = _error(edge.walls, chart, tracer)
+    error = _relative_errors(edge.walls, chart, tracer)
     within = [
         (_range_end(edge.frequency, fits, first, first - 1), _range_end(edge.frequency, fits, last, last + 1))
         for first, last in _runs(np.asarray(error <= tolerance))
@@ -274,7 +279,11 @@ def _fit(
 
 def _range_end(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:
     """The frequency [Hz] at which a model ceases to fit, by bisection between neighbours with the indices `good`
-    and `bad`; `bad` may lie beyond an end of the edge."""
+    and `bad`; `bad` may lie beyond an end of the edge.
+
+    frequency  (k,)  of the walls along the edge [Hz]
+    fits       frequency [Hz] -> whether the model fits at the edge's wall there
+    """
     if not 0 <= bad < len(frequency):
         return float(frequency[good])
     return _last_fitting(fits, float(frequency[good]), float(frequency[bad]))
@@ -289,7 +298,7 @@ def _last_fitting(fits: Callable[[float], bool], fitting: float, outside: float)
 
 
 def _spread_indices(count: int, at_most: int) -> Ints:
-    """Indices spread evenly over 0 to count - 1, at most so many, the first and the last among them."""
+    """Indices (k,) spread evenly over 0 to count - 1, at most so many, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, at_most)).round().astype(np.int64))
 
 
@@ -301,15 +310,16 @@ def _runs(good: Flags) -> Iterator[tuple[int, int]]:
 
 
 def _models(full: OperatingPoint) -> Iterator[tuple[str, str, Plant | None, str]]:
-    """Key, label, plant and reason of each model; without damping only where it has some."""
+    """Yield key, label, plant and reason of each simpler model: the plant, or None and the reason why there is
+    none. A model that has damping comes once more without it."""
     for key, label in SIMPLER:
         try:
             reduced = full.in_model(key)
-            itself, plant = reduced.ungripped_plant is full.ungripped_plant, reduced.plant
+            is_full, plant = reduced.ungripped_plant is full.ungripped_plant, reduced.plant
         except (ModelError, LoadError) as error:
             yield key, label, None, str(error)
             continue
-        if itself:
+        if is_full:
             continue
         damped = bool(plant.damping.any() or plant.lagged_dampers)
         yield key, label + (" with damping" if damped else ""), plant, ""

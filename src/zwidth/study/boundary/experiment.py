@@ -127,11 +127,12 @@ def run_experiment(
     top = TIP_SHARE * place.stiffness
     grid = low + (top - low) * np.arange(1, plan.stiffnesses + 1) / plan.stiffnesses
     total_trials, done, runs = plan.subjects * plan.trials, 0, []
-    dampings: Floats | None = None
-    for s, subject in enumerate(subjects):
-        for t in range(plan.trials):
+    dampings: Floats | None = None  # at which tips are measured: found in the first trial, the same in all
+    for subject_number, subject in enumerate(subjects):
+        for trial_number in range(plan.trials):
             report("measuring the boundary", done, total_trials)
-            trial, name = _trial(loop, subject, plan, s, t), f"subject {s} trial {t}"
+            trial = _trial(loop, subject, plan, subject_number, trial_number)
+            name = f"subject {subject_number} trial {trial_number}"
             edges = _edge_points(journal, f"{name} edges", partial(measure_edges, trial, grid, place, plan.box))
             if dampings is None:
                 dampings = tip_dampings(edges, place, plan.tips) if plan.tips else np.empty(0)
@@ -146,7 +147,8 @@ def run_experiment(
 
 
 def _with_visible(loop: Loop, plan: Plan) -> Plan:
-    """The plan with the default of `visible` for this loop's encoder, where it has none."""
+    """The plan; where it has no visible amplitude [m], with STEPS steps and NOISES standard deviations of the
+    noise of this loop's encoder."""
     if plan.visible is not None:
         return plan
     method = loop.controller.velocity
@@ -209,7 +211,10 @@ def _stability_trial(
 
 
 def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, trial: int) -> StabilityTrial:
-    """One trial of one subject, with its own random numbers."""
+    """One trial of one subject, both by their numbers from 0, from which its random numbers follow.
+
+    operator  the subject
+    """
     factors = (1.0, 1.0, 1.0)
     if plan.trials > 1:
         random = np.random.default_rng([plan.seed, subject, trial])
@@ -224,7 +229,7 @@ def _field_values(record: Any) -> list[Any]:
 
 
 def _edge_points(journal: Journal, name: str, compute: Callable[[], list[EdgePoint]]) -> list[EdgePoint]:
-    """The points that the journal keeps under this name; computed where it has none."""
+    """The points that the journal keeps under this name; `compute` measures them where it has none."""
     return [
         EdgePoint(*numbers)
         for numbers in journal.get_or_compute(name, lambda: [_field_values(p) for p in compute()])
@@ -243,11 +248,13 @@ def _exact_chart(loop: Loop, operator: Operator | None) -> StabilityChart | None
 def _combine_trials(
     runs: list[list[EdgePoint]], chart: StabilityChart | None, requested_points: int
 ) -> tuple[tuple[MeasuredPoint, ...], int]:
-    """Points of all trials, joined by edge and chosen stiffness or damping; and how many no trial found.
+    """Join the points of all trials by edge and chosen stiffness or damping, and average what was bisected.
 
     runs              points of each trial
     chart             exact one, for the number that was bisected; None: nan
     requested_points  number of points that were looked for
+
+    Returns  the points, lower edges first, then upper ones and tips; and how many no trial found
     """
     by_edge: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
     for points in runs:
@@ -293,7 +300,8 @@ def _causes(
     journal: Journal,
     report: Progress,
 ) -> tuple[Cause, ...]:
-    """The edges measured again without each nonlinear part, at EXPLAINED of the stiffnesses of these points."""
+    """The edges measured again without each nonlinear part, at EXPLAINED of the stiffnesses of `points`, those of
+    the first trial with all parts."""
     names = loop.nonlinear.kinds
     grid = sorted({p.stiffness for p in points if p.edge == "lower"})
     picked = [grid[i] for i in np.unique(np.linspace(0, len(grid) - 1, min(EXPLAINED + 2, len(grid))).astype(int))]
@@ -331,6 +339,6 @@ def without(loop: Loop, name: str) -> Loop:
             nonlinear, computer = replace(nonlinear, force_limit=inf), replace(computer, force_limit=inf)
         case _:
             raise ValueError(f"name must be one of the nonlinear parts in Nonlinear.kinds, got {name!r}")
-    if all(c.step == 0.0 and c.noise == 0.0 for c in nonlinear.counters):
+    if all(c.step == 0.0 and c.noise == 0.0 for c in nonlinear.counters):  # encoders that read exactly
         nonlinear = replace(nonlinear, counters=())
     return Loop(replace(loop.plant, nonlinear=nonlinear), computer)

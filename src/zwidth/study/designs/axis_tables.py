@@ -53,14 +53,19 @@ def axes_of(
         key = table.get("key")
         if not isinstance(key, str) or not key:
             continue
-        own = [] if "catalogue" in table else [(key, ("key",))]
-        faults = [fault for path, where in own for fault in overlap_faults(path, where, key, device, taken)]
+        # what a catalogue is of is no number, and its numbers are looked at with it
+        number_or_circumstance = [] if "catalogue" in table else [key]
+        faults = [
+            fault
+            for path in number_or_circumstance
+            for fault in overlap_faults(path, ("key",), key, device, taken)
+        ]
         axis: Axis | None = None
         if "catalogue" in table:
             axis = _catalogue_axis(table, key, device, folder, taken, faults)
         elif key in CIRCUMSTANCES:
             faults += _circumstance_faults(key, table, device)
-            axis = _axis(table, key, UNITS.get(key, "m" if key == "at" else ""), ())
+            axis = _axis_of_table(table, key, UNITS.get(key, "m" if key == "at" else ""), ())
             if table.get("tie"):
                 faults.append((("tie",), f"goes with a number of the device file, not with {key}; remove it"))
         elif device is not None:
@@ -87,12 +92,12 @@ def _number_axis(
     faults  that this axis' are added to
     bounds  as for `axes_of`
     """
-    message = list(key_faults(device.document, key, _values_with_paths(table), whole_ranges=bounds))
-    faults += message
-    if message:
+    wrong = list(key_faults(device.document, key, _values_with_paths(table), whole_ranges=bounds))
+    faults += wrong
+    if wrong:
         return None
     ties = list(ties_of(table, key, device, taken, faults))
-    axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
+    axis = _axis_of_table(table, key, unit_of(device.document, key), tuple(ties))
     whole = table.get("integer") is True or _takes_whole_numbers(device.document, key)
     if axis is not None and bounds and whole and axis.span is not None:
         if floor(axis.span[1]) - ceil(axis.span[0]) < 1:
@@ -162,7 +167,11 @@ def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[TableFault]
 def _catalogue_axis(
     table: dict[str, Any], key: str, device: Device | None, folder: Path, taken: SetNumbers, faults: TableFaults
 ) -> Axis | None:
-    """The axis of a catalogue; None where it has a fault, which is added to `faults`."""
+    """The axis of a catalogue; None where it has a fault, which is added to `faults`.
+
+    folder  that the catalogue's file lies in
+    taken   the numbers that other axes set; those of the catalogue are added
+    """
     given, file = table.get("set"), table["catalogue"]
     columns = {path: heading for path, heading in given.items() if isinstance(heading, str)} if given else {}
     if key in CIRCUMSTANCES:
@@ -191,7 +200,7 @@ def _takes_whole_numbers(document: dict[str, Any], key: str) -> bool:
 
 
 def _values_with_paths(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
-    """The entries of the axis's range and values, each with its key path."""
+    """The entries of the axis's range and values, each with its key path in the table, such as ("values", 2)."""
     return [
         ((key, n), value)
         for key in ("range", "values")
@@ -199,14 +208,15 @@ def _values_with_paths(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
     ]
 
 
-def _well_typed(values: list[tuple[KeyPath, Any]]) -> Iterator[tuple[KeyPath, Any]]:
-    """The entries but for those of a range that are no finite numbers, which `study_schema` reports."""
+def _without_wrong_range_ends(values: list[tuple[KeyPath, Any]]) -> Iterator[tuple[KeyPath, Any]]:
+    """The entries of `_values_with_paths` but for ends of a range that are no finite numbers, which `study_schema`
+    reports."""
     for where, value in values:
         if where[0] != "range" or (is_number(value) and isfinite(value)):
             yield where, value
 
 
-def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> Axis | None:
+def _axis_of_table(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> Axis | None:
     """The axis of a table; None where its values have a fault: `study_schema` or `_values_faults` reports it."""
     span, values, count = table.get("range"), table.get("values"), table.get("count")
     logarithmic = table.get("scale") == "log"
@@ -218,10 +228,10 @@ def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> 
     if not (isfinite(low) and isfinite(high)) or (logarithmic and low <= 0.0):
         return None
     # a count too large for memory is refused by `study.check_study`; its values are not made here
-    inner = (
+    listed = (
         spread((low, high), count, logarithmic=logarithmic) if type(count) is int and 0 < count <= 10**6 else ()
     )
-    return Axis(key, inner, (low, high), logarithmic, ties, unit)
+    return Axis(key, listed, (low, high), logarithmic, ties, unit)
 
 
 def overlap_faults(
@@ -255,12 +265,13 @@ def overlap_faults(
 
 
 def _exclude_each_other(one: KeyPath, other: KeyPath) -> bool:
-    """Whether these keys belong to one table and exclude each other."""
+    """Whether two key paths belong to one table and exclude each other, being of different groups of
+    `address.EXCLUSIVE`."""
     if one[:-1] != other[:-1]:
         return False
     groups = address.EXCLUSIVE.get(tuple(map(str, one[:-1])), ())
-    of = [[group for group in groups if step in group] for step in (one[-1], other[-1])]
-    return all(of) and of[0] != of[1]
+    groups_of_one, groups_of_other = ([group for group in groups if key in group] for key in (one[-1], other[-1]))
+    return bool(groups_of_one and groups_of_other) and groups_of_one != groups_of_other
 
 
 def key_faults(
@@ -268,6 +279,7 @@ def key_faults(
 ) -> Iterator[TableFault]:
     """Faults of a key that no device file has, or of values of a kind that the schema does not allow there.
 
+    values        each with its key path in the axis's table
     whole_ranges  whether a number that is whole may have a range
     """
     try:
@@ -296,15 +308,15 @@ def key_faults(
     elif spanned and "number" not in kinds and not whole_ranges:
         yield (("range",), f"cannot be used: '{key}' takes whole numbers; write values = [1, 2, 3]")
     else:
-        texts = _texts(steps)
+        texts = _allowed_texts(steps)
         yield from (
             ((*where,), message)
-            for where, value in _well_typed(values)
+            for where, value in _without_wrong_range_ends(values)
             if (message := _value_fault(value, kinds, key, texts))
         )
 
 
-def _texts(steps: KeyPath) -> list[str]:
+def _allowed_texts(steps: KeyPath) -> list[str]:
     """The texts that the schema allows at a path; [] where any text is allowed."""
     kinds = [kind for kind in schema.subschemas(steps) if kind.get("type") == "string"]
     return (
@@ -313,9 +325,9 @@ def _texts(steps: KeyPath) -> list[str]:
 
 
 def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str:
-    """What is wrong with a value; "" for nothing.
+    """Message: what is wrong with a value of an axis; "" for nothing.
 
-    kinds  JSON types that the schema allows;   texts  texts that it allows, [] for any
+    kinds  JSON types that the schema allows at the key;   texts  texts that it allows, [] for any
     """
     if isinstance(value, bool):
         fits, wanted = "boolean" in kinds, "no true or false"
@@ -344,6 +356,8 @@ def ties_of(
 ) -> Iterator[Tie]:
     """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`.
 
+    table  of the axis
+    key    the number that the axis varies
     taken  what axes so far set; what the ties set is added
     kind   what messages call an axis
     """
@@ -385,7 +399,7 @@ def _tie_faults(
     """Faults of a tie of the number at `to` to the axis at `key`; `table` is that of the axis."""
     try:
         address.resolve(document, to)
-        own = address.get(document, to) if address.exists(document, to) else None
+        value_in_file = address.get(document, to) if address.exists(document, to) else None
     except DeviceError as error:
         yield ((), f"'{to}' {error.faults[0].message}")
         return
@@ -400,7 +414,7 @@ def _tie_faults(
             yield (("factor",), "cannot multiply texts, and the values of this axis are texts; remove it")
     else:
         base = address.get(document, key) if address.exists(document, key) else None
-        if not _all_numbers(own):
+        if not _all_numbers(value_in_file):
             yield (
                 (),
                 f"'{to}' has no value in the device file, which power needs; use factor, or set it first",
@@ -408,7 +422,10 @@ def _tie_faults(
         if not is_number(base) or base == 0:
             given = f"got {quote(base)}" if base is not None else "and it has none; set it first"
             yield (("power",), f"needs a value of '{key}' other than 0 in the device file, {given}")
-        elif not all(is_number(value) and value / base > 0 for _, value in _well_typed(_values_with_paths(table))):
+        elif not all(
+            is_number(value) and value / base > 0
+            for _, value in _without_wrong_range_ends(_values_with_paths(table))
+        ):
             yield (("power",), f"needs values of the sign that '{key}' has in the device file, {quote(base)}")
 
 
@@ -421,7 +438,7 @@ def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None)
     """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
     if key in WANTED:
         number = WANTED_BY_KEY[key]
-        for where, value in _well_typed(_values_with_paths(table)):
+        for where, value in _without_wrong_range_ends(_values_with_paths(table)):
             if not is_number(value) or not number.allows(value):
                 yield (where, f"must be a finite number, {number.allowed}, got {quote(value)}")
         return
@@ -433,7 +450,8 @@ def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None)
 
 
 def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
-    """What is wrong with a value of at, direction, assembly, model or operator for a device; "" for nothing."""
+    """Message: what is wrong with a value of at, direction, assembly, model or operator for a device; "" for
+    nothing."""
     if key in ("at", "direction"):
         if not isinstance(value, list | tuple) or not all(map(is_number, value)):
             return f"must be 2 or 3 numbers, got {quote(value)}"

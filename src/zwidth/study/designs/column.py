@@ -64,7 +64,8 @@ def plane_positions(dataset: xr.Dataset) -> Floats:
 
 
 def areas(x: Floats, y: Floats) -> Floats:
-    """Area [m²] that belongs to each point (ny, nx) of a grid by the trapezoidal rule.
+    """Area [m²] that belongs to each point (ny, nx) of a grid of lines x (nx,), y (ny,) [m] by the trapezoidal
+    rule.
 
     >>> areas(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0])).tolist()
     [[0.5, 1.0, 0.5], [0.5, 1.0, 0.5]]
@@ -164,8 +165,8 @@ class Column:
             if self.statistic == "conditioning_index":
                 value = global_conditioning_index(values.values, values.status, weights)
             elif self.statistic == "isotropy_index":
-                own = point()
-                value = global_isotropy_index(own.jacobian, values.status, len(own.drives.names))
+                cells = point()
+                value = global_isotropy_index(cells.jacobian, values.status, len(cells.drives.names))
             else:
                 whole = overall(values.values, values.status, weights, self.measure.better)
                 value = float(getattr(whole, self.statistic))
@@ -215,7 +216,7 @@ def column_named(
 
 
 def _judged(measure: Measure, better: Better | None) -> Measure:
-    """The measure, with the values that are better where it leaves that open."""
+    """The measure, with `better` taken over where the measure leaves open which values are better."""
     return measure if measure.better is not None or better is None else replace(measure, better=better)
 
 
@@ -272,7 +273,7 @@ class Requirement:
         return beyond if self.at_least else -beyond
 
     def met(self, values: ArrayLike) -> Flags:
-        """Which values meet the bound; nan does not."""
+        """Whether each of the values (...) meets the bound; nan does not."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.margin(values) >= 0.0)
 

@@ -46,7 +46,7 @@ class DesignGroup:
 
     rows         (P,)  their numbers, from the first that was asked for
     batch        all of them
-    valid        (P,)  marks of those that are certain to be valid; the rest is to be built alone
+    valid        (P,)  whether each is certain to be valid; one that is not is to be built alone
     positions    (P, 2) or (P, 3)  of the handle, where they differ; None: the same for all
     chosen       circumstances that are the same for all, by key
     """
@@ -78,11 +78,13 @@ class DesignGrouping:
         if not columns:
             return
         kinds = [self._kinds(one.key, one.values) for one in columns]
-        codes = [code[one.places] for (code, _), one in zip(kinds, columns, strict=True)]
-        found, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_inverse=True)
-        for n, own in enumerate(found):
+        codes = [code[one.places] for (code, _), one in zip(kinds, columns, strict=True)]  # (P,) of each column
+        combinations, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_inverse=True)
+        for n, combination in enumerate(combinations):
             rows = np.flatnonzero(group_of.ravel() == n)
-            kind = tuple((one.key, names[code]) for one, (_, names), code in zip(columns, kinds, own, strict=True))
+            kind = tuple(
+                (one.key, names[code]) for one, (_, names), code in zip(columns, kinds, combination, strict=True)
+            )
             group = self._group(rows, kind, [one._replace(places=one.places[rows]) for one in columns])
             if group is not None:
                 yield group
@@ -91,23 +93,24 @@ class DesignGrouping:
         """For each value (k,) a number that stands for its kind, and the kinds by these numbers. Designs that are
         built together have values of the same kind."""
         steps = self._path(key)
-        if key in WANTED:
+        if key in WANTED:  # no part of the device: all values are alike
             return np.zeros(len(values), dtype=np.int64), [None]
         if steps is not None and takes_arrays(steps) and all(type(value) in (int, float) for value in values):
             numbers = np.array(values, dtype=np.float64)
-            none = (numbers == 0.0) & (not _in_list(steps))
-            return np.where(none, 1, np.where(np.isfinite(numbers), 0, 2)), ["number", "0", "not finite"]
+            zero = (numbers == 0.0) & (not _in_list(steps))  # takes a part of the device away
+            return np.where(zero, 1, np.where(np.isfinite(numbers), 0, 2)), ["number", "0", "not finite"]
         number_of: dict[str, int] = {}
         code = [number_of.setdefault(self._kind(key, steps, value), len(number_of)) for value in values]
         return np.array(code), list(number_of)
 
     def _kind(self, key: str, steps: KeyPath | None, value: Any) -> str:
-        """Kind of one value: "number" for all that arrays may hold, else the value; of a list that of each."""
+        """Kind of one value of a key, `steps` its path: "number" for all that arrays may hold, else the value as
+        text; of a list that of each."""
         if isinstance(value, list | tuple) and (key == "at" or (steps is not None and takes_arrays(steps))):
             return f"[{', '.join(self._kind(key, steps, inner) for inner in value)}]"
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        free = number and (key == "at" or (steps is not None and takes_arrays(steps) and value != 0))
-        return "number" if free else repr(value)
+        in_array = number and (key == "at" or (steps is not None and takes_arrays(steps) and value != 0))
+        return "number" if in_array else repr(value)
 
     def _path(self, key: str) -> KeyPath | None:
         """The resolved path of a key; None for a circumstance, and where the document has no such place."""
@@ -119,8 +122,12 @@ class DesignGrouping:
         return self._steps[key]
 
     def _group(self, rows: Rows, kind: tuple[Any, ...], taken: list[DesignColumn]) -> DesignGroup | None:
-        """The group of the designs `rows`, which all have one kind; None where no batch can be built of them."""
-        document = self._document(kind, taken, len(rows))
+        """The group of the designs `rows`, which all have one kind; None where no batch can be built of them.
+
+        kind   each key with the kind of its values
+        taken  the columns, of these designs alone
+        """
+        document = self._valid_document(kind, taken, len(rows))
         if document is None:
             return None
         positions, columns = None, {}
@@ -138,7 +145,9 @@ class DesignGrouping:
         chosen = {key: value for key, value in example.items() if key in CIRCUMSTANCES and key not in WANTED}
         return DesignGroup(rows, batch, valid, positions, chosen)
 
-    def _document(self, kind: tuple[Any, ...], taken: list[DesignColumn], count: int) -> dict[str, Any] | None:
+    def _valid_document(
+        self, kind: tuple[Any, ...], taken: list[DesignColumn], count: int
+    ) -> dict[str, Any] | None:
         """The document of a valid design of a kind; None where none of the `count` designs of `taken` is valid."""
         if self._documents.get(kind) is None:
             for row in range(count):
@@ -152,17 +161,18 @@ class DesignGrouping:
         return self._documents.get(kind)
 
     def design_document(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
-        """The document with a design's settings. Raises DeviceError."""
+        """The device's document with the operator and the numbers of a design, by key; other circumstances are
+        left aside. Raises DeviceError."""
         document = self.document
         if "operator" in chosen:
             document = with_operator(document, self.operators[chosen["operator"]])
-        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
-        return address.assign_all(document, own)
+        numbers = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        return address.assign_all(document, numbers)
 
 
 def _in_list(steps: KeyPath) -> bool:
-    """Whether a path leads to an element of a list. A 0 there takes no part of the device away, as that of a lag
-    does."""
+    """Whether a path leads to an element of a list. A 0 there takes no part of the device away; elsewhere it may,
+    as a lag of 0 does."""
     return isinstance(steps[-1], int)
 
 
@@ -207,9 +217,9 @@ def build_at_point(groups: Iterable[DesignGroup], point: OperatingPoint) -> Iter
         if not group.batch.differs:
             continue
         try:
-            built, alone = group.batch.at_point(point)
+            built, to_build_alone = group.batch.at_point(point)
         except (PostureError, DeviceError):
             continue  # each design alone says why
-        kept = np.flatnonzero(group.valid & ~alone & (built.status == OK))
+        kept = np.flatnonzero(group.valid & ~to_build_alone & (built.status == OK))
         if len(kept):
             yield BuiltDesigns(group.rows[kept], built[kept])

@@ -112,6 +112,7 @@ class Axis:
         """
         if self.parts:
             chosen = [self.parts[self.values.index(value)] for value in values]
+            # all parts set the same paths, in the same order
             yield from ((path, [part[n][1] for part in chosen]) for n, (path, _) in enumerate(self.parts[0]))
             return
         yield self.key, values
@@ -206,7 +207,8 @@ class Sampling:
         return tuple(axis.values[int(step)] for axis, step in zip(self.axes, steps, strict=True))
 
     def columns(self, first: int, last: int) -> list[tuple[Axis, Sequence[Any], Ints]]:
-        """Of designs first to last - 1: each axis, values along it, and at which of them each design is.
+        """For each axis, of designs first to last - 1: the axis, values along it, and the place (last - first,)
+        among these at which each design is.
 
         >>> Sampling((Axis("a", (1, 2)), Axis("b", ("x", "y", "z")))).columns(2, 5)[0][1:]
         ((1, 2), array([0, 1, 1]))
@@ -217,9 +219,9 @@ class Sampling:
         if self.size is None:
             places = np.unravel_index(designs, self.shape) if self.axes else ()
             return [(axis, axis.values, place) for axis, place in zip(self.axes, places, strict=True)]
-        own, size = designs - first, self.size
+        each, size = designs - first, self.size  # every design has a value of its own
         return [
-            (axis, axis.values_at(shares(self.seed, n, size, first, last)), own)
+            (axis, axis.values_at(shares(self.seed, n, size, first, last)), each)
             for n, axis in enumerate(self.axes)
         ]
 
@@ -290,7 +292,7 @@ def _parts(headings: list[str], rows: list[list[str]], columns: Mapping[str, str
 
 
 def _number(text: str) -> float | None:
-    """A cell's number; None where it holds none."""
+    """The number in a cell of the table; None where it holds none, or nan."""
     try:
         value = float(text)
     except ValueError:
@@ -331,7 +333,7 @@ def share(seed: int, axis: int, size: int, design: int) -> float:
 
 @lru_cache(maxsize=64)
 def _block(seed: int, axis: int, size: int, number: int) -> Floats:
-    """The `shares` of one block of BLOCK designs, kept for the next design of it."""
+    """The `shares` (BLOCK,), of the last block fewer, of one block of designs, kept for the next design of it."""
     return shares(seed, axis, size, number * BLOCK, min((number + 1) * BLOCK, size))
 
 
@@ -349,7 +351,8 @@ def _ordered(seed: int, axis: int, size: int) -> Ints:
 
 
 def _permuted(numbers: Words, size: int, keys: Words) -> Words:
-    """Images of numbers below `size` under a permutation of them; keys (ROUNDS + 1,) of its hashes."""
+    """Images of numbers below `size` under a permutation of them; keys (ROUNDS + 1,) of its hashes. The network
+    permutes a few numbers more: an image beyond the size is sent through it again, until it lies below."""
     low = isqrt(size - 1) + 1  # bases of the two digits; their product is hardly above the size
     high = -(-size // low)
     images = _network(numbers, np.uint64(low), np.uint64(high), keys)
@@ -360,7 +363,7 @@ def _permuted(numbers: Words, size: int, keys: Words) -> Words:
 
 def _network(numbers: Words, low: np.uint64, high: np.uint64, keys: Words) -> Words:
     """Images of numbers below low * high under a permutation of them: the Feistel network (see the file)."""
-    left, right = numbers // low, numbers % low
+    left, right = numbers // low, numbers % low  # the two digits, below `high` and below `low`
     for n in range(0, ROUNDS, 2):
         left = (left + _hash(right + keys[n]) % high) % high
         right = (right + _hash(left + keys[n + 1]) % low) % low

@@ -20,7 +20,7 @@ from zwidth.questions import WANTED
 from zwidth.study.designs.axis_tables import TableFaults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
-from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
+from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown_key_sentence
 from zwidth.study.designs.task import Task, task_of
 from zwidth.study.workspace.plane_grid import PlaneGrid, plane_of
 
@@ -86,7 +86,8 @@ class Study:
 
     @property
     def turns(self) -> bool:
-        """Whether every design renders moments about an axis, so that stiffness is in N m/rad."""
+        """Whether every design renders moments about an axis, so that stiffness is in N m/rad; False where an axis
+        varies the direction."""
         varied = "direction" in [axis.key for axis in self.sampling.axes]
         return not varied and self.device.renders_moments(self.direction)
 
@@ -115,9 +116,9 @@ def check_study(
     Raises         TooLarge  where the designs would not fit into memory
     """
     checked = _checked_file(document, faults)
-    faults += _missing(document, needs or (("axis",) if bounds else ("measures", "axis")))
+    faults += _missing_key_faults(document, needs or (("axis",) if bounds else ("measures", "axis")))
     device = _device_with_numbers(device, faults)
-    columns = () if user_measures is None else _columns(document, user_measures, faults)
+    columns = () if user_measures is None else _measure_columns(document, user_measures, faults)
     axes = axes_of(document, device, faults, File(label).parent, bounds=bounds)
     _check_sampling(document, faults)
     _check_circumstances(document, device, faults)
@@ -147,7 +148,7 @@ def _checked_file(document: dict[str, Any], faults: TableFaults) -> StudyFile | 
     try:
         return StudyFile.model_validate(document)
     except ValidationError as error:
-        faults += validation_messages(error, document, description, unknown)
+        faults += validation_messages(error, document, description, unknown_key_sentence)
     return None
 
 
@@ -168,7 +169,7 @@ def _device_with_numbers(device: Device | None, faults: TableFaults) -> Device |
 def _sampling_of(checked: StudyFile, axes: tuple[Axis, ...]) -> Sampling:
     """Return the designs of a checked study over its axes. Raises TooLarge where these are too many."""
     hypercube = checked.sampling == "latin-hypercube"
-    _check_size(checked, hypercube)
+    _check_design_count(checked, hypercube)
     return Sampling(
         axes,
         checked.count if hypercube else None,
@@ -201,7 +202,7 @@ def _in_rendered_units(study: Study) -> Study:
     )
 
 
-def _missing(document: dict[str, Any], needs: Sequence[str]) -> Iterator[tuple[KeyPath, str]]:
+def _missing_key_faults(document: dict[str, Any], needs: Sequence[str]) -> Iterator[tuple[KeyPath, str]]:
     """Faults of keys that a document needs and lacks; the schema reports one that is only misspelt, as unknown."""
     for key in needs:
         others = [other for other in document if other not in StudyFile.model_fields]
@@ -209,7 +210,7 @@ def _missing(document: dict[str, Any], needs: Sequence[str]) -> Iterator[tuple[K
             yield (key,), f"is missing; add it ({description((key,))})"
 
 
-def _columns(
+def _measure_columns(
     document: dict[str, Any], user_measures: Mapping[str, Measure], faults: TableFaults
 ) -> tuple[Column, ...]:
     """The columns whose measures exist; unknown and repeated ones are added to `faults`."""
@@ -248,8 +249,8 @@ def _check_circumstances(document: dict[str, Any], device: Device | None, faults
             continue
         if key in varied:
             faults.append(((key,), "is an axis as well; remove one of the two"))
-        right = isinstance(document[key], list if key in ("at", "direction") else str)
-        if key in ("at", "direction", "assembly") and right and document[key]:
+        right_type = isinstance(document[key], list if key in ("at", "direction") else str)
+        if key in ("at", "direction", "assembly") and right_type and document[key]:
             components = document[key] if key != "assembly" else [0.0]
             if all(map(is_number, components)) and (message := circumstance_fault(key, document[key], device)):
                 fault = ((key,), message)
@@ -265,7 +266,11 @@ def plane_of_study(
     faults: TableFaults,
     spelling: Spelling,
 ) -> PlaneGrid | None:
-    """The grid over the workspace, the same for all designs; None where no measure is over it."""
+    """The grid over the workspace, the same for all designs; None where no measure is over it, or anything is
+    wrong, which is added to `faults`.
+
+    plane  a grid that was given; None: as the document's [workspace] says
+    """
     names = [column.name for column in columns if column.statistic]
     if not names:
         if (plane is not None or "workspace" in document) and columns:
@@ -316,7 +321,10 @@ def _plane_of_document(
 def _task(
     document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults, bounds: bool
 ) -> Task | None:
-    """The task of the study; None without one, or where anything is wrong with it, which is added to `faults`."""
+    """The task of the study; None without one, or where anything is wrong with it, which is added to `faults`.
+
+    bounds  whether the study is read for an optimiser, which has several operators
+    """
     if "task" not in document:
         return None
     if "workspace" in document:
@@ -333,8 +341,10 @@ def _task(
     return task_of(document, device, faults)
 
 
-def _check_size(checked: StudyFile, hypercube: bool) -> None:
+def _check_design_count(checked: StudyFile, hypercube: bool) -> None:
     """Raise TooLarge for more designs than any computer takes, before any of them is made.
+
+    hypercube  whether they are a Latin hypercube, and not all combinations, or paired axes
 
     Whether fewer fit into memory, or on the disk, depends on where they are kept: `executor.run` and `Store` see.
     """

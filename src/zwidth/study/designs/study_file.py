@@ -67,7 +67,7 @@ def read_document(label: str) -> dict[str, Any]:
         text = read_text(label, LARGEST_FILE)
     except FileError as error:
         if error.missing and label in bundled_names():
-            raise _device_instead(label, "a bundled device") from None
+            raise _device_error(label, "a bundled device") from None
         raise fail(label, "", f"{error}; give a study file") from None
     return parse_document(text, label, STUDIES)
 
@@ -94,14 +94,14 @@ def study_of(
     """
     check_not_newer(document, label)
     if DEVICE_KEYS & document.keys() and not STUDY_KEYS & document.keys():
-        raise _device_instead(label, "a device")
+        raise _device_error(label, "a device")
     faults: TableFaults = []
     absent: TableFaults = []  # files that the study names and that are not there
     file_faults: list[Fault] = []  # of those that are
     folder = File(label).parent
-    device = _device(document, folder, faults, absent, file_faults)
+    device = _device_of_study(document, folder, faults, absent, file_faults)
     operators = axis_operators(document, folder, absent, file_faults)
-    own_measures = _own_measures(document, folder, faults)
+    own_measures = _user_measures(document, folder, faults)
     study = check_study(document, label, device, operators, own_measures, faults, bounds=bounds, needs=needs)
     if further is not None:
         further(device, faults)
@@ -113,8 +113,9 @@ def study_of(
     return study
 
 
-def _device_instead(label: str, what: str) -> DeviceError:
-    """The error about a device, or a device file, that was given as a study; `what` it is, in words."""
+def _device_error(label: str, what: str) -> DeviceError:
+    """The error about a device that was given in place of a study; `what` it is: "a device" or "a bundled
+    device"."""
     name = json.dumps(File(label).name)
     return fail(
         label, "", f"is {what}, not a study; write a study file with device = {name}, measures and an [[axis]]"
@@ -140,7 +141,7 @@ def axis_operators(
         for n, name in enumerate(names if isinstance(names, list) else []):
             if isinstance(name, str) and name:
                 with _faults_kept((*key, n), name, folder, absent, file_faults):
-                    operators[name] = _operator(name, folder)
+                    operators[name] = _operator_table(name, folder)
     return operators
 
 
@@ -159,7 +160,7 @@ def _faults_kept(
             absent += [(key, f"'{name}' {fault.message}") for fault in error.faults]
 
 
-def _device(
+def _device_of_study(
     document: dict[str, Any], folder: File, faults: TableFaults, absent: TableFaults, file_faults: list[Fault]
 ) -> Device | None:
     """The device with the study's operator and changes; None where it cannot be loaded.
@@ -178,7 +179,7 @@ def _device(
     inner, label = found
     if isinstance(operator, str) and operator:
         with _faults_kept(("operator",), operator, folder, absent, file_faults):
-            inner = with_operator(inner, _operator(operator, folder))
+            inner = with_operator(inner, _operator_table(operator, folder))
     for n, change in enumerate(changes if isinstance(changes, list) else []):
         if not isinstance(change, str):
             continue
@@ -196,8 +197,9 @@ def _device(
     return device
 
 
-def _own_measures(document: dict[str, Any], folder: File, faults: TableFaults) -> dict[str, Measure] | None:
-    """The measures of the file that the study names, by name; None where it has faults."""
+def _user_measures(document: dict[str, Any], folder: File, faults: TableFaults) -> dict[str, Measure] | None:
+    """The user's measures of the file that the study names, by name; {} where it names none, None where the file
+    has faults."""
     file = document.get("measures_file")
     if not isinstance(file, str) or not file:
         return {}
@@ -208,13 +210,16 @@ def _own_measures(document: dict[str, Any], folder: File, faults: TableFaults) -
         return None  # a measure that is not known may be one of those
 
 
-def _operator(name: str, folder: File) -> dict[str, Any] | None:
+def _operator_table(name: str, folder: File) -> dict[str, Any] | None:
     """The [operator] table of a name or a file beside the study; None for nobody."""
     return None if name == NOBODY else operator_table(_resolve_name(name, folder, OPERATORS))
 
 
 def _resolve_name(name: str, folder: File, shelf: BundledFiles = DEVICES) -> str:
-    """A bundled name as it is, any other as a file beside the study."""
+    """A bundled name as it is, any other as the path of a file beside the study.
+
+    shelf  which bundled files are looked at: devices or operators
+    """
     return name if name in bundled_names(shelf) else str(folder / name)
 
 
@@ -283,7 +288,7 @@ def study_over(
     document: dict[str, Any] = {
         "device": device.label,
         "measures": names,
-        "axis": [{"key": key, "values": values} for key, values in _axes(axes)],
+        "axis": [{"key": key, "values": values} for key, values in _axis_values(axes)],
         **({"sampling": "paired"} if paired else {}),
         **{KEYS.get(name, name): plain_value(value) for name, value in given.items() if value is not None},
     }
@@ -298,7 +303,9 @@ def study_over(
         faults += _angle_faults(device, position, axes)
     faults += absent
     if faults or operator_faults or study is None:
-        raise DeviceError([*(_fault(path, message, list(axes)) for path, message in faults), *operator_faults])
+        raise DeviceError(
+            [*(_fault_of_argument(path, message, list(axes)) for path, message in faults), *operator_faults]
+        )
     return replace(study, at=position) if isinstance(position, Mapping) else study
 
 
@@ -311,8 +318,9 @@ def measures_in_file(
     return [one.name if isinstance(one, Measure) else one for one in listed], {**(user_measures or {}), **given}
 
 
-def _axes(axes: Any) -> Iterator[tuple[str, list[Any]]]:
-    """Path and values of each axis, as Python numbers. Raises TypeError, ValueError."""
+def _axis_values(axes: Any) -> Iterator[tuple[str, list[Any]]]:
+    """Yield path and values of each axis, the values as a list of Python numbers. Raises TypeError for another
+    kind of argument, and ValueError for no axis or no value."""
     if not isinstance(axes, Mapping):
         raise wrong_type("axes", "a dictionary of paths and values", axes)
     if not axes:
@@ -345,12 +353,13 @@ def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str
     return faults
 
 
-def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
-    """The fault at a path of the document, under the argument that it came from; `keys` of the axes."""
+def _fault_of_argument(path: KeyPath, message: str, keys: list[str]) -> Fault:
+    """The fault at a path of the document that `study_over` makes, under the argument that it came from; `keys`
+    are those of the axes, in order."""
     argument = ARGUMENTS.get(str(path[0]), str(path[0]))
     if path[0] != "axis" or len(path) < 3:
         return Fault(argument, "", message)
-    _, number, entry, *_ = path
+    _, number, entry, *_ = path  # ("axis", number of the axis, key of its table)
     key = keys[int(number)]
     if entry != "key":
         return Fault(argument, key, message)

@@ -41,14 +41,14 @@ def key_of(argument: Argument) -> Any:
 
 
 def _tie_as_table(value: Any) -> Any:
-    """A tie written as its key alone, as a table."""
+    """A tie as a table: one that is written as its key alone becomes a table with that key. Raises ValueError."""
     if not isinstance(value, str | dict):
         raise ValueError(f"must be a path, or a table with a key, got {quote(value)}")
     return {"key": value} if isinstance(value, str) else value
 
 
-def _one_or_two(value: Any) -> Any:
-    """A single count for both axes of the grid."""
+def _count_of_both_axes(value: Any) -> Any:
+    """A single count as a list of it for both axes of the grid; anything else as given."""
     return [value, value] if is_number(value) else value
 
 
@@ -149,19 +149,19 @@ class StudyWorkspaceSection(Section):
     count: Annotated[
         tuple[Annotated[WholeNumber, Field(ge=2, le=MOST)], ...],
         Field(min_length=2, max_length=2),
-        BeforeValidator(_one_or_two),
+        BeforeValidator(_count_of_both_axes),
     ] = documented_key("points along both axes, or along each", default=(15, 15))
 
 
-def _one_or_more(value: Any) -> Any:
-    """A single number as a list."""
+def _as_list(value: Any) -> Any:
+    """A single number as a list of it; anything else as given."""
     return [value] if is_number(value) else value
 
 
 Counts = Annotated[
     tuple[Annotated[WholeNumber, Field(ge=1, le=MOST)], ...],
     Field(min_length=1, max_length=3),
-    BeforeValidator(_one_or_more),
+    BeforeValidator(_as_list),
 ]
 Span = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)]
 
@@ -291,7 +291,7 @@ _TABLES: Final[dict[str, Any]] = {
 
 
 def _section_of(path: KeyPath) -> Any:
-    """The section that the last key of a path stands in."""
+    """The class of the section that the last key of a path stands in."""
     names = [part for part in path[:-1] if isinstance(part, str) and part in _TABLES]
     return _TABLES[names[-1]] if names else StudyFile
 
@@ -310,10 +310,10 @@ def description(path: KeyPath) -> str:
     return f"{field.description} [{unit}]" if unit else str(field.description)
 
 
-def unknown(path: KeyPath) -> str:
+def unknown_key_sentence(path: KeyPath) -> str:
     """The sentence on a key that a study file does not have.
 
-    >>> unknown(("axis", 0, "ranges"))
+    >>> unknown_key_sentence(("axis", 0, "ranges"))
     "is not a key of an [[axis]]; did you mean 'range'?"
     """
     section, key = _section_of(path), str(path[-1])

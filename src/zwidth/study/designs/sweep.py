@@ -107,7 +107,8 @@ def column_attributes(sweep: Sweep, column: int) -> dict[str, str]:
 
 
 def coordinates(sweep: Sweep, first: int, last: int) -> dict[str, Any]:
-    """The coordinates of a dataset: of a grid all along its axes, else those of designs first to last - 1."""
+    """The coordinates of a dataset by name, as (dimension, values, attributes): of a grid all along its axes, else
+    those of designs first to last - 1."""
     sampling = sweep.job.sampling
     if sampling.kind == "grid":
         along = [(axis.key, axis, list(axis.values)) for axis in sampling.axes]
@@ -126,12 +127,17 @@ def coordinates(sweep: Sweep, first: int, last: int) -> dict[str, Any]:
 def _axis_coordinates(
     sweep: Sweep, axis: Axis, values: list[Any]
 ) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
-    """The coordinates of an axis: its values, their components, and the numbers tied to it."""
+    """Yield name, values and attributes of each coordinate of an axis: its values, their components, and the
+    numbers tied to it.
+
+    values  along the axis; one that is a position or direction is a tuple
+    """
     attributes = {**unit_attributes(axis.unit), "long_name": axis.key, "scale": "log" if axis.log else "linear"}
     if values and isinstance(values[0], tuple):
         texts = {"long_name": axis.key, "role": "axis"}
         yield axis.key, (np.array([axis_value_text(value) for value in values]), texts)
         length = max(len(value) for value in values)
+        # z of a vector in the plane is 0
         padded = np.array([[*value, *[0.0] * (length - len(value))] for value in values])
         for n in range(length):
             yield f"{axis.key}_{COMPONENTS[n]}", (padded[:, n], attributes)
@@ -142,6 +148,7 @@ def _axis_coordinates(
             continue
         tied = np.array(each)
         unit = unit_of(sweep.study.device.document, key)
+        # a tied list has a coordinate for each of its numbers
         for place in np.ndindex(tied.shape[1:]):
             path = ".".join([key, *map(str, place)])
             yield path, (tied[(slice(None), *place)], {**unit_attributes(unit), "long_name": path})
@@ -272,7 +279,8 @@ class ColumnSummary:
     counts: Ints = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
 
     def add(self, first: int, values: Floats, status: NDArray[np.uint8]) -> None:
-        """Add consecutive designs, the first of them by its number, in ascending order."""
+        """Add consecutive designs behind those added before: the number of the first, and values and status (k,)
+        of the column."""
         self.counts += np.bincount(status, minlength=256)
         there = np.flatnonzero(status == OK)
         if not len(there):
@@ -322,7 +330,7 @@ class Sweep(Result):
     def __repr__(self) -> str:
         axes = ", ".join(axis.key for axis in self.job.sampling.axes)
         lines = [f"Sweep: {plural(self.job.count, 'design')} of {self.study.device.label!r} over {axes}"]
-        lines += [self._extremes(n) for n in range(len(self.job.columns))][:SHOWN]
+        lines += [self._extremes_in_words(n) for n in range(len(self.job.columns))][:SHOWN]
         more = len(self.job.columns) - SHOWN
         return "\n  ".join([*lines, f"and {more} more"] if more > 0 else lines)
 
@@ -360,7 +368,7 @@ class Sweep(Result):
         """The designs as columns, one design a row."""
         return sweep_table(self)
 
-    def _extremes(self, column: int) -> str:
+    def _extremes_in_words(self, column: int) -> str:
         """A column in words: its least and largest value, and how many designs have one."""
         one, summary = self.job.columns[column], self.summaries[column]
         span = ""

@@ -58,7 +58,8 @@ from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
-Found: TypeAlias = tuple[Any, Any, str]  # value and status, of one cell or of all, and the reason
+# Value, status and reason ("" for none); the first two of one cell, or arrays of all
+Found: TypeAlias = tuple[Any, Any, str]
 WALL: Final = tuple(WANTED)  # numbers of the wanted wall, as arguments
 
 
@@ -113,11 +114,15 @@ class SweepJob:
     def measures(self) -> tuple[str, ...]:
         """Columns, as they are written in the study; of unreduced ones each cell."""
         names = tuple(one.name for one in self.columns)
-        return tuple(f"{name}, cell {n}" for name in names for n in range(self._width)) if self.cells else names
+        return (
+            tuple(f"{name}, cell {n}" for name in names for n in range(self._numbers_per_column))
+            if self.cells
+            else names
+        )
 
     @property
-    def _width(self) -> int:
-        """How many numbers each column has."""
+    def _numbers_per_column(self) -> int:
+        """How many numbers each column has: 1, or of unreduced ones a number for each position and direction."""
         if not self.cells or self.positions is None:
             return 1
         return int(self.positions[..., 0].size) * (1 if self.directions is None else len(self.directions))
@@ -143,29 +148,29 @@ class SweepJob:
 
     def compute(self, first: int, last: int) -> CellValues:
         """Designs first to last - 1: together; alone where a design has no value together, or has to say why."""
-        shape = last - first, len(self.columns), self._width
+        shape = last - first, len(self.columns), self._numbers_per_column
         values, status = np.full(shape, np.nan), np.full(shape, MISSING, dtype=np.uint8)
-        reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
+        reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]  # (status, reason) -> designs
 
         def fill(row: int, column: int, found: Found) -> None:
-            """Note what was found of a design, and the reason with the design's number."""
+            """Put down what was found of a design in a column, and the reason with the design's number."""
             values[row, column], status[row, column], reason = found
             if reason:
                 reasons[column].setdefault((int(np.max(found[1])), reason), []).append(first + row)
 
         for group in self._grouping.groups(list(self._design_columns(first, last))):
-            for row, column, found in self._together(group, first):
+            for row, column, found in self._found_in_group(group, first):
                 fill(row, column, found)
         for row, column in np.argwhere((status == MISSING).all(axis=-1)).tolist():
-            fill(row, column, self._alone(first + row, self.columns[column]))
+            fill(row, column, self._found_alone(first + row, self.columns[column]))
         notes = [
             tuple(
                 Note(*key, len(at), (min(at),)) for key, at in sorted(kinds.items(), key=lambda item: min(item[1]))
             )
             for kinds in reasons
         ]
-        flat = last - first, len(self.columns) * self._width
-        each = tuple(note for note in notes for _ in range(self._width))
+        flat = last - first, len(self.columns) * self._numbers_per_column
+        each = tuple(note for note in notes for _ in range(self._numbers_per_column))
         return CellValues(values.reshape(flat), status.reshape(flat), each)
 
     @cached_property
@@ -179,8 +184,8 @@ class SweepJob:
             for key, each in axis.columns(values):
                 yield DesignColumn(key, each, places)
 
-    def _together(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
-        """Row, column and what was found, of the designs of a group that need not be computed alone.
+    def _found_in_group(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
+        """Yield row, column and what was found, of the designs of a group that need not be computed alone.
 
         first  number of the design of row 0
         """
@@ -188,15 +193,17 @@ class SweepJob:
         circumstances = [chosen.get(key) for key in ("direction", "assembly", "model")]
         if isinstance(chosen.get("at"), Mapping):  # joint angles are solved for one design at a time
             return
-        for over_workspace in (False, True):
+        for over_workspace in (False, True):  # columns at the handle's position, then those over all positions
             columns = [n for n, one in enumerate(self.columns) if self._over_positions(one) == over_workspace]
             cells = self.positions[..., 0].size if over_workspace and self.positions is not None else 1
-            size = max(1, MOST_CELLS // cells)
+            size = max(1, MOST_CELLS // cells)  # designs at once
             for start in range(0, len(group.rows) if columns else 0, size):
                 piece = slice(start, start + size)
                 at = chosen.get("at") if group.positions is None else group.positions[piece]
                 try:
-                    point, alone = group.batch[piece].at(self.positions if over_workspace else at, *circumstances)
+                    point, to_build_alone = group.batch[piece].at(
+                        self.positions if over_workspace else at, *circumstances
+                    )
                 except (OutOfReach, Singular, BeyondLimit) as error:  # of the one mechanism that all of them have
                     status = _status_of(error)
                     missed = group.rows[piece][group.valid[piece]]
@@ -206,8 +213,9 @@ class SweepJob:
                     continue  # each design alone says why
                 if over_workspace and self.directions is not None:
                     point = point.along_each(self.directions)
+                # whether one point is that of all designs, as their device and positions do not differ
                 same = not group.batch.differs and (over_workspace or group.positions is None)
-                decided = group.valid[piece] & ~alone
+                decided = group.valid[piece] & ~to_build_alone
                 if not (over_workspace or same):
                     missed = decided & (point.status != OK)
                     for row, status in zip(group.rows[piece][missed], point.status[missed], strict=True):
@@ -219,7 +227,7 @@ class SweepJob:
                 rows = group.rows[piece][kept]
                 point = point if same else point[kept]
                 for column in columns:
-                    found = self._measured(self.columns[column], point, first + rows, same)
+                    found = self._found_at_points(self.columns[column], point, first + rows, same)
                     for row, one in zip(rows, found, strict=True):
                         if one is not None:
                             yield int(row), column, one
@@ -233,25 +241,32 @@ class SweepJob:
                 continue
             at = chosen.get("at") if group.positions is None else group.positions
             try:
-                point, alone = group.batch.at(at, *(chosen.get(key) for key in ("direction", "assembly", "model")))
+                point, to_build_alone = group.batch.at(
+                    at, *(chosen.get(key) for key in ("direction", "assembly", "model"))
+                )
             except (PostureError, LoadError, DeviceError):
                 continue  # each design alone says why
-            kept = np.flatnonzero(group.valid & ~alone & (point.status == OK))
+            kept = np.flatnonzero(group.valid & ~to_build_alone & (point.status == OK))
             if len(kept):
                 yield group.rows[kept], point[kept]
 
     def point_alone(self, number: int) -> OperatingPoint | tuple[int, str]:
-        """The point of a design at its handle's position; or status and reason, where it has none."""
+        """The operating point of a design, built by itself, at its handle's position; or status and reason, where
+        it has none."""
         try:
             return self.design(number).point()
-        except _NoPoint as none:
-            return none.status, none.reason
+        except _NoPoint as failure:
+            return failure.status, failure.reason
 
-    def _measured(self, one: Column, point: OperatingPoint, designs: Ints, same: bool) -> Iterator[Found | None]:
-        """Value, status and reason of a column for each of several designs; None for one to be computed alone.
+    def _found_at_points(
+        self, one: Column, point: OperatingPoint, designs: Ints, same: bool
+    ) -> Iterator[Found | None]:
+        """Yield value, status and reason of a column for each of several designs; None for one to be computed
+        alone, as several reasons are possible.
 
-        point    of all designs along its first axis; `same`: one for all
+        point    of all designs along its first axis, or one for all
         designs  (P,) their numbers in the study
+        same     whether `point` is one for all
         """
         measure = one.measure
         if same and not measure.of_wall:
@@ -264,7 +279,9 @@ class SweepJob:
                 yield self._column_value(one, wanted, point if same else point[place])
             return
         try:
-            result = evaluate(measure.at_wall(self._walls(designs, point)) if measure.of_wall else measure, point)
+            result = evaluate(
+                measure.at_wall(self._wanted_walls(designs, point)) if measure.of_wall else measure, point
+            )
         except MeasureError as error:
             yield from [(np.nan, NO_VALUE, error.spelled(as_key))] * len(designs)
             return
@@ -302,7 +319,8 @@ class SweepJob:
         return one.reduce(found, point, self.weights)
 
     def _column_value(self, one: Column, measure: Measure, point: OperatingPoint) -> Found:
-        """Value, status and reason of a column at a point; `measure` is its own at the design's wanted wall."""
+        """Value, status and reason of a column at a point; `measure` is the column's own, told the wanted wall of
+        the design."""
         try:
             if not self._over_positions(one) and measure.each:
                 status = int(point.status)
@@ -311,44 +329,46 @@ class SweepJob:
         except MeasureError as error:
             return np.nan, NO_VALUE, error.spelled(as_key)
 
-    def _walls(self, designs: Ints, point: OperatingPoint) -> WantedWall | WantedWalls:
-        """The wanted walls of designs, by their numbers (P,), along the first of the point's axes."""
+    def _wanted_walls(self, designs: Ints, point: OperatingPoint) -> WantedWall | WantedWalls:
+        """The wanted walls of designs, by their numbers (P,), each number an array (P, 1, ...) along the first of
+        the point's axes."""
         each = [self.design(int(number)).wall for number in designs]
         given = [name for name in WALL if getattr(each[0], name) is not None]  # and so of all of them
-        later = [1] * (len(point.shape) - 1)
-        numbers = {name: np.array([getattr(one, name) for one in each]).reshape(-1, *later) for name in given}
+        ones = [1] * (len(point.shape) - 1)
+        numbers = {name: np.array([getattr(one, name) for one in each]).reshape(-1, *ones) for name in given}
         return WantedWalls(**numbers, colliding_links=each[0].colliding_links)
 
     def design(self, number: int) -> Design:
         """One of the designs, by its number from 0."""
         return Design(self, number)
 
-    def _alone(self, number: int, one: Column) -> Found:
-        """Value, status and reason of a column for a single design."""
+    def _found_alone(self, number: int, one: Column) -> Found:
+        """Value, status and reason of a column for a single design, by its number; the last design is kept."""
         if self._cache.get("design", (None, None))[0] != number:
             self._cache["design"] = number, self.design(number)
         design = self._cache["design"][1]
         try:
             point = design.workspace() if self._over_positions(one) else design.point()
-        except _NoPoint as none:
-            return np.nan, none.status, none.reason
+        except _NoPoint as failure:
+            return np.nan, failure.status, failure.reason
         return self._column_value(one, one.measure.at_wall(design.wall), point)
 
     @cached_property
-    def _in_mechanism(self) -> frozenset[str]:
+    def _keys_in_mechanism(self) -> frozenset[str]:
         """The axes and tied numbers that stand in [mechanism]."""
         keys = {key for axis in self.sampling.axes for key in axis.keys}
-        own = keys - {*CIRCUMSTANCES}
-        return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
+        numbers = keys - {*CIRCUMSTANCES}
+        return frozenset(key for key in numbers if address.resolve(self.document, key)[0] == "mechanism")
 
-    def of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
+    def settings_of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
         """Path and value of each number of a design that stands in [mechanism]."""
-        return [(key, value) for key, value in chosen.items() if key in self._in_mechanism]
+        return [(key, value) for key, value in chosen.items() if key in self._keys_in_mechanism]
 
     def device(self, chosen: dict[str, Any]) -> Device:
-        """The device with these values of its axes; the last one is cached. Raises DeviceError."""
-        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
-        key = (chosen.get("operator"), own)
+        """The device of a design, by key and value of what its axes set; the last one is cached. Raises
+        DeviceError."""
+        numbers = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        key = (chosen.get("operator"), numbers)
         if self._cache.get("key") != key:
             document = self._grouping.design_document(chosen)
             # whether it can be put together shows where its posture is solved, which takes a tenth of the time
@@ -380,24 +400,26 @@ class Design:
         return point if self.job.directions is None else point.along_each(self.job.directions)
 
     def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
-        """The operating point of a name, solved when it is first asked for. Raises _NoPoint each time."""
+        """The operating point of a name, "point" or "workspace", solved when it is first asked for. Raises
+        _NoPoint, and the same again each time."""
         if name not in self.points:
             try:
                 self.points[name] = self._solve(name, positions)
-            except _NoPoint as none:
-                self.points[name] = none
+            except _NoPoint as failure:
+                self.points[name] = failure
         point = self.points[name]
         if isinstance(point, _NoPoint):
             raise point
         return point
 
     def _solve(self, name: str, positions: Any) -> OperatingPoint:
-        """The operating point at some positions. The job keeps the last posture of a name for the next design."""
+        """The operating point at some positions. The job keeps the last posture of a name, or why there is none,
+        for the next design with the same mechanism."""
         try:
             device = self.job.device(self.settings)
             assembly = self._circumstance("assembly")
-            # what changes the computer or the operator alone leaves the posture as it is, but for a load
-            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.settings)
+            # all that the posture depends on, but for a load: neither the computer nor the operator
+            same = name, self._circumstance("at"), assembly, self.job.settings_of_mechanism(self.settings)
             kept, solved = self.job._cache.get(name, (None, None)) if device.load is None else (None, None)
             if kept == same and isinstance(solved, _NoPoint):
                 raise solved
@@ -414,9 +436,9 @@ class Design:
         except EquilibriumError as error:
             raise _NoPoint(NO_EQUILIBRIUM, str(error)) from error
         except (OutOfReach, Singular, BeyondLimit) as error:
-            none = _NoPoint(_status_of(error))
-            self.job._cache[name] = same, none
-            raise none from error
+            failure = _NoPoint(_status_of(error))
+            self.job._cache[name] = same, failure
+            raise failure from error
         except (PostureError, DeviceError) as error:
             raise _NoPoint(FAILED, _error_text(error)) from error
         except ValueError as error:

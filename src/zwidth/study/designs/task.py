@@ -130,7 +130,10 @@ def _positions(
             if len(each) != len(box):
                 faults.append((("count",), f"must be one number, or {len(box)} for the axes of box_m"))
                 return None
-            lines = [_steps(span, PER_AXIS if n is None else n, finer) for span, n in zip(box, each, strict=True)]
+            lines = [
+                _coordinates_along(span, PER_AXIS if n is None else n, finer)
+                for span, n in zip(box, each, strict=True)
+            ]
             corners = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(box))
             return np.array([device.position(point) for point in corners.tolist()])
         if "radius_m" in given:
@@ -148,7 +151,7 @@ def _positions(
     return np.asarray(point.posture.position, dtype=np.float64)[None] if point.posture is not None else None
 
 
-def _steps(span: Sequence[float], count: int, finer: int) -> Floats:
+def _coordinates_along(span: Sequence[float], count: int, finer: int) -> Floats:
     """Coordinates (k,) along one axis of a box [m]; the middle alone where it has no extent, or for one point.
 
     finer  as for `task_of`
@@ -161,10 +164,15 @@ def _steps(span: Sequence[float], count: int, finer: int) -> Floats:
 
 def _round_points(rings: int, solid: bool) -> Floats:
     """Points (n, 3) of the unit disk, on rings round its centre with 6 points more on each, or of the unit ball,
-    on shells; the outermost lie on its rim. Twice as many rings hold the coarser ones."""
+    on shells; the outermost lie on its rim. Twice as many rings hold the coarser ones.
+
+    rings  number of rings or shells
+    solid  True: of the ball; False: of the disk, in the plane of the first two coordinates
+    """
     points = [np.zeros((1, 3))]
     for k in range(1, rings + 1):
         if solid:
+            # as the area of the shell grows; the ends of the axes belong to every shell
             points.append(k / rings * np.vstack([sphere(12 * k * k), np.eye(3), -np.eye(3)]))
             continue
         angle = 2.0 * np.pi * np.arange(6 * k) / (6 * k)
@@ -175,7 +183,11 @@ def _round_points(rings: int, solid: bool) -> Floats:
 def _directions(
     given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
 ) -> Floats | None:
-    """Unit vectors (d, 3) along which walls are rendered; None: the device's own, or there are faults."""
+    """Unit vectors (d, 3) along which walls are rendered, `finer` times as many where they are spread; None: the
+    device's own, or there are faults.
+
+    given  the table [task]
+    """
     wanted = given.get("directions")
     if device.mechanism is None or wanted is None:
         return None
@@ -202,10 +214,11 @@ def _directions(
 
 
 def _spread_directions(motions: Floats, first: Floats, count: int) -> Floats:
-    """Unit vectors (d, 3) spread over half a circle, or half a sphere: opposite directions have equal walls.
+    """Unit vectors (count, 3) spread over half a circle, or half a sphere: opposite directions have equal walls.
+    Of a handle that moves along a line the one vector (1, 3).
 
     motions  (3, r)  orthonormal, the directions in which the handle can move
-    first    (3,)    from which they begin
+    first    (3,)    from whose part in the plane of motion they begin; in space they do not depend on it
     """
     along = motions @ (motions.T @ first)
     if not np.linalg.norm(along) > 0.0:
@@ -219,4 +232,4 @@ def _spread_directions(motions: Floats, first: Floats, count: int) -> Floats:
         across = across * np.sign(across[np.argmax(np.abs(across))])
         angle = np.pi * np.arange(count) / count
         return np.asarray(np.cos(angle)[:, None] * along + np.sin(angle)[:, None] * across)
-    return sphere(2 * count)[:count]
+    return sphere(2 * count)[:count]  # the points of its upper half come first

@@ -190,15 +190,17 @@ class Cluster:
                 f"the scheduler at {self.address} has no workers; start one on each computer: "
                 f"dask worker {self.address}"
             )
-        for address, own in client.run(_versions_there(), on_error="return").items():
-            if isinstance(own, BaseException):
-                raise ClusterError(f"the worker at {address} does not answer: {type(own).__name__}: {own}")
-            if not own.get("zwidth"):
+        for address, releases in client.run(_versions_reader(), on_error="return").items():
+            if isinstance(releases, BaseException):
+                raise ClusterError(
+                    f"the worker at {address} does not answer: {type(releases).__name__}: {releases}"
+                )
+            if not releases.get("zwidth"):
                 raise ClusterError(
                     f"the worker at {address} has no zwidth; install zwidth {self._versions['zwidth']} there, in "
                     "the Python that runs dask worker"
                 )
-            if wrong := different(own, self._versions):
+            if wrong := different(releases, self._versions):
                 raise ClusterError(
                     f"the worker at {address} has {wrong}; results would not be the same: install the same there"
                 )
@@ -213,8 +215,8 @@ class _Tasks:
         self.job = client.submit(_job_itself, job, key=f"zwidth-job-{job.key}-{secrets.token_hex(4)}")
         self.replies: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self.running: dict[Future, tuple[CellRange, int]] = {}  # future -> range, and how often it was lost
-        self.events: list[str] = []
-        self._looked = monotonic()
+        self.events: list[str] = []  # a sentence for each worker that left, for the next batch
+        self._looked = monotonic()  # when the scheduler was last looked at
 
     def finished(self, ranges: Iterable[CellRange]) -> Generator[tuple[CellRange, Batch], None, None]:
         """Send ranges of cells, and yield each with its batch as it is finished."""
@@ -223,7 +225,7 @@ class _Tasks:
         while self.running:
             future = self._next_finished()
             task, lost = self.running.pop(future, ((0, 0), -1))
-            if lost < 0:  # is not one of those that run
+            if lost < 0:  # none that is still waited for
                 continue
             batch = self._result(future, task, lost)
             self._fill(coming)
@@ -232,7 +234,7 @@ class _Tasks:
                 yield task, Batch(batch.cells, (*batch.events, *events), batch.error)
 
     def cancel(self) -> None:
-        """Take back what is not finished."""
+        """Cancel the ranges that are not finished, where the scheduler still answers."""
         if self.running and _is_connected(self.client) and not self.cluster._silent:
             with suppress(Exception):
                 _within(LEAVE, lambda: self.client.cancel(list(self.running), force=True))
@@ -261,7 +263,8 @@ class _Tasks:
         future.add_done_callback(self.replies.put)
 
     def _next_finished(self) -> Future:
-        """A future that is finished, one way or other. Raises ClusterEnded where the scheduler has ended."""
+        """Wait for a future that is done, failed or cancelled. Raises ClusterEnded where the scheduler has
+        ended."""
         while True:
             if monotonic() - self._looked > LOOK:
                 self._check_scheduler()
@@ -269,7 +272,7 @@ class _Tasks:
                 return self.replies.get(timeout=LOOK)
 
     def _check_scheduler(self) -> None:
-        """See whether the scheduler is there, and all its workers."""
+        """Note workers that have left in `events`. Raises ClusterEnded where the scheduler has ended."""
         self._looked = monotonic()
         if not _is_connected(self.client):
             raise ClusterEnded(f"the scheduler at {self.cluster.address} has ended")
@@ -277,7 +280,8 @@ class _Tasks:
             self.events.append(f"the worker at {address} left the cluster; what it computed is computed again")
 
     def _result(self, future: Future, task: CellRange, lost: int) -> Batch | None:
-        """The cells of a finished future; None where its range was sent once more."""
+        """The cells of a finished future; None where its range was sent once more, as its workers have ended.
+        Raises ClusterEnded where these ended LOST times, or the scheduler has ended."""
         from distributed import KilledWorker
 
         if future.cancelled():
@@ -321,7 +325,7 @@ def _is_connected(client: Client) -> bool:
 
 
 def _is_of_connection(error: Exception) -> bool:
-    """Whether dask says by an error that a connection, or what was asked over it, is gone."""
+    """Whether an error is what dask raises where a connection is lost, or a task was cancelled."""
     from distributed import CancelledError
     from distributed.comm import CommClosedError
 
@@ -333,10 +337,11 @@ def _workers_of(client: Client) -> dict[str, int]:
     return {str(address): int(threads) for address, threads in client.nthreads().items()}
 
 
-def _versions_there() -> Callable[[], dict[str, str]]:
-    """A function that returns `workers.versions`, {} without zwidth; nested, so that dask sends it as code."""
+def _versions_reader() -> Callable[[], dict[str, str]]:
+    """A function that a worker calls for its `workers.versions`: zwidth alone in a release that has none, {}
+    without zwidth. It is nested, so that dask sends it as code."""
 
-    def ask() -> dict[str, str]:
+    def read() -> dict[str, str]:
         try:
             from zwidth.study.jobs.workers import versions
         except ImportError:
@@ -347,7 +352,7 @@ def _versions_there() -> Callable[[], dict[str, str]]:
             return {"zwidth": __version__}
         return versions()
 
-    return ask
+    return read
 
 
 def _connection_message(address: str) -> str:

@@ -144,7 +144,8 @@ def _executor_for(
 ) -> tuple[PackedJob | None, Executor | None]:
     """The packed job and the executor that computes all its cells; None, None: this process begins by itself.
 
-    stack  ends an executor that is opened here
+    stack     ends an executor that is opened here
+    executor  one that was opened before; None: one is opened for a time limit or a cluster
     """
     if executor is not None and (workers, time_limit, cluster) != (None, None, None):
         raise ValueError("an executor has its own workers, time limit and cluster; give either it or them")
@@ -153,7 +154,7 @@ def _executor_for(
     by = "executor" if executor is not None else "time_limit" if cluster is None else "cluster"
     if processor == "cuda":
         raise ValueError(f"{by} is for processes, and the GPU is used by this one alone; leave one of the two out")
-    if (packed := pack_job(job)) is None:
+    if (packed := pack_job(job)) is None:  # the job exists in this process only
         if executor is not None and executor.time_limit is None:
             return None, None
         by = by if executor is None else "time_limit"
@@ -203,6 +204,7 @@ def _drain(executor: Executor, packed: PackedJob, first: int, last: int) -> None
 class _Plan:
     """Which batches of a job are to be computed.
 
+    again  as for `run_job`
     size   cells per batch
     left   number of cells that are to be computed
     done   (batches,)  whether each is there
@@ -274,7 +276,7 @@ class _CellCollection:
         self.notes: list[Notes] = []
 
     def add(self, first: int, cells: CellValues) -> None:
-        """Take in consecutive cells that begin with number `first`."""
+        """Take in consecutive cells, of which `first` is the number of the first."""
         last = first + len(cells.values)
         self.values[first:last], self.status[first:last] = cells.values, cells.status
         self.notes.append(cells.notes)
@@ -308,9 +310,9 @@ class _Events:
 
 
 class _Fault:
-    """Holds batches back until it is certain that the job has no fault that every cell meets.
+    """Holds the first batches back until it is certain that the job has no fault that makes every cell raise.
 
-    left  number of cells to come; -1: there is a cell without the fault
+    left  number of cells to compute; -1: it is certain, nothing is held back any more
     """
 
     def __init__(self, left: int) -> None:
@@ -319,7 +321,8 @@ class _Fault:
         self.count, self.text = 0, ""  # of the cells held, and of the error that each of them raised
 
     def sift(self, first: int, batch: Batch) -> Iterator[tuple[int, CellValues]]:
-        """Take a batch; yield those that may be kept, with their first cells. Raises the error of all cells."""
+        """Take the batch that begins with a cell; yield first cell and cells of each batch that is held back no
+        more. Raises the error that all cells raised, once these are ENOUGH, or all."""
         self.held.append((first, batch.cells))
         error = batch.error
         if self.left >= 0 and error is not None and (not self.count or str(error) == self.text):
@@ -348,8 +351,8 @@ def _compute_here_first(
         # the first range may include compiling
         slow = n > 0 and left > 0 and seconds / (last - first) * left > patience
         if slow and workers > 1 and (packed := pack_job(job)) is not None:
-            rest = -(-left // plan.size)
-            with open_executor(min(workers, rest)) as executor:
+            batches_left = -(-left // plan.size)
+            with open_executor(min(workers, batches_left)) as executor:
                 yield from executor.compute(packed, ranges)
             return
 
@@ -378,7 +381,7 @@ def batch_size(compute: Callable[[int, int], object], count: int, slots: int) ->
     size, place, failed = 2, 0.0, 0
     while size <= most and most > 1 and failed < FAILED_TRIALS:
         first = int(place * (count - size))
-        place = (place + GOLDEN) % 1.0
+        place = (place + GOLDEN) % 1.0  # spreads the trials evenly, however many there are
         try:
             seconds = _computing_time(compute, first, first + size)
         except Exception as error:
@@ -539,7 +542,7 @@ class _Feed:
         self._put(None)
 
     def replies_of(self, threads: list[Thread]) -> Generator[tuple[CellRange, Batch], None, None]:
-        """The finished ranges of all threads. Raises what a thread met."""
+        """Yield the finished ranges of all threads, until each has ended. Raises what a thread met."""
         ended = 0
         while ended < len(threads):
             reply = self.replies.get()

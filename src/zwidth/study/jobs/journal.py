@@ -38,7 +38,8 @@ def fingerprint(*parts: object) -> str:
 
 
 def _plain(part: object) -> Any:
-    """The value as nested lists of strings, no two alike for different values."""
+    """The value as nested lists of its type and its text, no two alike for different values. Raises TypeError as
+    `fingerprint`."""
     if isinstance(part, float | np.floating):
         return ["float", float(part).hex()]
     if part is None or isinstance(part, bool | int | str):
@@ -51,8 +52,8 @@ def _plain(part: object) -> Any:
         return ["list", [_plain(value) for value in part]]
     if is_dataclass(part) and not isinstance(part, type):
         # a field that is neither given nor compared holds what has been computed so far
-        own = [field.name for field in fields(part) if field.init or field.compare]
-        return [type(part).__name__, [[name, _plain(getattr(part, name))] for name in own]]
+        names = [field.name for field in fields(part) if field.init or field.compare]
+        return [type(part).__name__, [[name, _plain(getattr(part, name))] for name in names]]
     hint = "; load measures with zwidth.measures.load_measures, or leave out the store" if callable(part) else ""
     raise TypeError(f"a fingerprint cannot hold {part!r}: its value cannot be read{hint}")
 
@@ -104,9 +105,14 @@ class Journal:
 
 
 def _lines_to_keep(path: Path, lines: list[bytes], not_empty: bool, question: str) -> list[bytes]:
-    """The lines of a journal to keep: up to the first damaged one; of another question, a new first line alone."""
+    """The lines of a journal to keep: up to the first damaged one; of another question, a new first line alone.
+
+    lines      of the file, without a last one that was cut short
+    not_empty  whether the file holds anything, be it a part of a line
+    Raises     StoreError  as `Journal`
+    """
     first = json.dumps({"version": STORE_VERSION, "question": question}).encode()
-    header = _entry(lines[0]) if lines else {}
+    header = _json_object(lines[0]) if lines else {}
     if message := newer_version_message(header.get("version"), STORE_VERSION):
         raise StoreError(f"{path.name}: its version {message}, or name another file")
     if not_empty and not isinstance(header.get("question"), str):
@@ -116,14 +122,14 @@ def _lines_to_keep(path: Path, lines: list[bytes], not_empty: bool, question: st
     unchecked = without_checksums(header.get("version"))
     kept = [first]
     for line in lines[1:]:
-        entry = _entry(line) if unchecked else read_checked_line(line)
+        entry = _json_object(line) if unchecked else read_checked_line(line)
         if not entry.keys() >= {"name", "value"}:
             break
         kept.append(checked_line(entry).removesuffix(b"\n") if unchecked else line)
     return kept
 
 
-def _entry(line: bytes) -> dict[str, Any]:
+def _json_object(line: bytes) -> dict[str, Any]:
     """The JSON object of a line; {} where it holds none."""
     try:
         entry = json.loads(line)

@@ -82,23 +82,23 @@ class JobSeries:
         self._following = True
         if self.folder is None:
             return
-        own = {"question": fingerprint(question, __version__), "study": question, "release": __version__}
-        if self._is_kept_for(own):
+        identity = {"question": fingerprint(question, __version__), "study": question, "release": __version__}
+        if self._is_kept_for(identity):
             return
         self._take_folder()
-        if not self._is_kept_for(own) and not any(
+        if not self._is_kept_for(identity) and not any(
             stores_in(self.folder)
         ):  # another run may have been here meanwhile
             draft = self.folder / f".{HEADER}"
             draft.write_text(
-                json.dumps({"zwidth": KIND, "version": STORE_VERSION, **own}) + "\n", encoding="utf-8"
+                json.dumps({"zwidth": KIND, "version": STORE_VERSION, **identity}) + "\n", encoding="utf-8"
             )
             draft.replace(self.folder / HEADER)
 
-    def _is_kept_for(self, own: dict[str, str]) -> bool:
+    def _is_kept_for(self, identity: dict[str, str]) -> bool:
         """Whether the folder says that it keeps this question's work. Raises StoreError where it keeps another's.
 
-        own  "question" and "study": fingerprints of this question with the release, and without it
+        identity  "question" and "study": fingerprints of this question with the release, and without it
 
         Without a store no work is lost, whatever it says. A folder with stores and without a fingerprint is of an
         older layout: it is recognised by its stores, one after another.
@@ -118,8 +118,8 @@ class JobSeries:
             raise StoreError(f"{self.folder}: its version {message}, or name another folder")
         if message := unchecked_version_message(header.get("version")):
             raise StoreError(f"{self.folder}: its version {message}; remove it, or name another folder")
-        if header.get("question") != own["question"]:
-            raise kept_for_another(str(self.folder), whose_work(header, own["study"]))
+        if header.get("question") != identity["question"]:
+            raise kept_for_another(str(self.folder), whose_work(header, identity["study"]))
         return True
 
     def _take_folder(self) -> None:
@@ -139,9 +139,9 @@ class JobSeries:
         """
         whole = job.count if of is None else of
 
-        def report(said: str, now: int, _: int) -> None:
+        def report(stage: str, done_here: int, _: int) -> None:
             if self.progress is not None:
-                self.progress(said, min(done + now, whole), whole)
+                self.progress(stage, min(done + done_here, whole), whole)
 
         store = None
         if self.folder is not None:
@@ -155,7 +155,7 @@ class JobSeries:
         began = perf_counter()
         executor = self._executor_in_time()
         slots = 1 if executor is None else executor.slots
-        batch = -(-job.count // (BATCHES * slots))
+        batch = -(-job.count // (BATCHES * slots))  # from SMALL on `run_job` measures how many are best
         cells = run_job(
             job,
             store,
@@ -170,10 +170,11 @@ class JobSeries:
         return cells.in_memory()
 
     def _executor_in_time(self) -> Executor | None:
-        """Processes or the cluster, opened when first needed; None while this process alone is faster."""
-        asked = self.cluster is not None or self.time_limit is not None
+        """Processes or the cluster, opened when first needed: at once for a cluster or a time limit, else after
+        PATIENCE. None until then: this process computes alone."""
+        at_once = self.cluster is not None or self.time_limit is not None
         several = (self.workers or cores()) > 1 and self._spent > PATIENCE
-        if self._executor is None and (asked or several):
+        if self._executor is None and (at_once or several):
             self._executor = self._stack.enter_context(open_executor(self.workers, self.cluster, self.time_limit))
         return self._executor
 

@@ -143,12 +143,13 @@ class Store:
         limit = UNLIMITED if time_limit is None else time_limit
         given_up = self._given_up_after()
         for first, cells in self.stored_batches():
-            longer = limit > given_up and bool((cells.status == OUT_OF_TIME).any())
-            found[first // self.batch] = not longer
+            has_more_time = limit > given_up and bool((cells.status == OUT_OF_TIME).any())
+            found[first // self.batch] = not has_more_time
         return found
 
     def limit_time(self, time_limit: float | None) -> None:
-        """Keep the time limit of the run that goes on here, see `done`."""
+        """Write the time limit [s] of the run that goes on here into the store, see `done`; None: nothing is
+        written."""
         import zarr
 
         if time_limit is not None and time_limit != self._given_up_after():
@@ -164,7 +165,8 @@ class Store:
                 yield first, self.read_batch(first)
 
     def read_batch(self, first: int) -> CellValues:
-        """The batch that begins with a cell. Raises StoreError where it is not there, or is damaged."""
+        """The batch whose first cell has the number `first`. Raises StoreError where it is not there, or is
+        damaged."""
         arrays = self._open_arrays()
         assert self.batch is not None
         assert self._notes is not None
@@ -182,7 +184,7 @@ class Store:
         return CellValues(values, status, notes)
 
     def write_batch(self, first: int, cells: CellValues) -> None:
-        """Write a batch. Raises OSError where it cannot be written."""
+        """Write the batch whose first cell has the number `first`. Raises OSError where it cannot be written."""
         values, status = self._open_arrays()
         part = slice(first, first + len(cells.values))
         values[part] = cells.values
@@ -238,11 +240,12 @@ class Store:
         )
 
     def _open_arrays(self) -> tuple[Any, Any]:
+        """The zarr arrays of values and of status (count, measures) of a store that has been begun."""
         assert self._arrays is not None, "not begun"
         return self._arrays
 
     def _given_up_after(self) -> float:
-        """The time limit of the last run that had one [s]."""
+        """The time limit of the last run that had one [s]; 0 where none had."""
         import zarr
 
         limit = zarr.open_group(str(self.path), mode="r").attrs.get("time_limit_s")
@@ -295,7 +298,7 @@ class Store:
 
 
 def _digest_of(attributes: Mapping[str, Any]) -> str:
-    """Digest of a store's attributes but itself."""
+    """SHA-256 of a store's attributes, all but the digest that is kept among them."""
     others = {name: value for name, value in attributes.items() if name != DIGEST}
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
@@ -306,7 +309,8 @@ def _descriptions(folder: Path) -> dict[str, str]:
 
 
 def _digest_of_cells(values: Floats, status: NDArray[np.uint8]) -> int:
-    """CRC-32 of a batch's numbers; of all nan alike, since zarr may give back another nan than was written."""
+    """CRC-32 of a batch's values and status (cells, measures); of all nan alike, since zarr may give back another
+    nan than was written."""
     plain = np.where(np.isnan(values), np.nan, values).astype("<f8")
     return zlib.crc32(np.asarray(status, dtype=np.uint8).tobytes(), zlib.crc32(plain.tobytes()))
 
@@ -338,13 +342,13 @@ class StoredCells:
 
     @cached_property
     def values(self) -> Floats:
-        """All values in memory. Raises TooLarge."""
+        """All values (count, measures) in memory. Raises TooLarge."""
         self._check()
         return np.concatenate([cells.values for _, cells in self.pieces()])
 
     @cached_property
     def status(self) -> NDArray[np.uint8]:
-        """All status in memory. Raises TooLarge."""
+        """All status (count, measures) in memory. Raises TooLarge."""
         self._check()
         return np.concatenate([cells.status for _, cells in self.pieces()])
 
@@ -394,12 +398,13 @@ class FolderLock:
         return self._file is not None
 
     def acquire(self, folder: Path) -> bool:
-        """Take the lock. Returns whether nobody else holds it. Raises OSError where the file cannot be written."""
+        """Take the lock. True: this object holds it now; False: another does. Raises OSError where the file cannot
+        be written."""
         if self._file is not None:
             return True
         file = os.open(folder / FILE, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            if not _lock(file):
+            if not _lock_file(file):
                 return False
             owner = json.dumps({"process": os.getpid(), "host": socket.gethostname()}).encode()
             os.ftruncate(file, 0)
@@ -432,8 +437,8 @@ def owner_of(folder: Path) -> str:
     return "another process"
 
 
-def _lock(file: int) -> bool:
-    """Lock an open file. Returns whether nobody else has."""
+def _lock_file(file: int) -> bool:
+    """Lock an open file, given by its descriptor. True: it is locked; False: another has locked it."""
     try:
         import fcntl
     except ImportError:  # Windows
@@ -480,7 +485,8 @@ class NotesFile:
                 self._end = file.tell()
 
     def write(self, first: int, notes: Notes, digest: int) -> None:
-        """Write the notes of the batch that begins with a cell, and the digest of its numbers. Raises OSError."""
+        """Write the notes of the batch whose first cell has the number `first`, and the digest of its numbers.
+        Raises OSError."""
         value = [[[one.status, one.reason, one.count, list(one.first)] for one in notes_of] for notes_of in notes]
         line = checked_line({"name": str(first), "digest": digest, "value": value})
         with open(self.path, "r+b") as file:
@@ -491,8 +497,11 @@ class NotesFile:
         self._end += len(line)
 
     def read(self, first: int, digest: int) -> Notes:
-        """The notes of the batch that begins with a cell. Raises ValueError where none are written, and where they
-        are those of other numbers."""
+        """The notes of the batch whose first cell has the number `first`. Raises ValueError where none are
+        written, and where they are those of other numbers.
+
+        digest  of the batch's numbers (`_digest_of_cells`)
+        """
         place = self._places.get(first)
         if place is None:
             raise ValueError(f"{self.path.name} has no line of the batch at {first}")
@@ -502,5 +511,6 @@ class NotesFile:
         if entry.get("digest") != digest:
             raise ValueError(f"{self.path.name} tells of other numbers in the batch at {first}")
         return tuple(
-            tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in entry["value"]
+            tuple(Note(status, reason, count, tuple(cells)) for status, reason, count, cells in notes)
+            for notes in entry["value"]
         )

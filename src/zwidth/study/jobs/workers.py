@@ -125,13 +125,15 @@ class WorkerProcess:
         if self.time_limit is None:
             cells: CellValues = self._ask(("compute", job.key, first, last), None)
             return cells
+        # code that the process has still to load may make cells late: that time is not theirs
         limit = self.time_limit + (TOGETHER if last - first > 1 else 0.0)
         message = "compute", job.key, first, last
         if job.code in self._loaded:
             cells = self._ask(message, limit)
-        elif known := self._computed.get(job.code):
-            self._prepare(known[0])
-            self._ask(("compute", known[0].key, known[1], known[1] + 1), limit + LOADING)
+        elif known := self._computed.get(job.code):  # a cell that a lost process computed in time loads the code
+            known_job, cell = known
+            self._prepare(known_job)
+            self._ask(("compute", known_job.key, cell, cell + 1), limit + LOADING)
             self._prepare(job)
             cells = self._ask(message, limit)
         else:
@@ -192,7 +194,11 @@ class WorkerProcess:
                 return
 
     def _ask(self, message: tuple[Any, ...], limit: float | None) -> Any:
-        """Send a message; return the reply's content. Raises OutOfTime after `limit` [s], without compiling."""
+        """Send a message and return the content of its reply. Raises what the job raised there, WorkerLost, and
+        OutOfTime after `limit` [s], in which compiling is not counted.
+
+        message  ("job", key, data) or ("compute", key, first, last)
+        """
         process = self.process
         if process is None:  # ended by another thread
             raise WorkerLost("the run was ended")
@@ -215,7 +221,8 @@ class WorkerProcess:
         return content
 
     def _read(self, process: subprocess.Popen[bytes], clock: _Clock | None = None) -> tuple[str, Any]:
-        """Kind and content of the next reply. Raises WorkerLost; OutOfTime where the clock ended the process."""
+        """Kind and content of the next reply: "started"; "compiling" and whether it begins to; "done" and the
+        answer; "raised" and the error. Raises WorkerLost; OutOfTime where the clock ended the process."""
         assert process.stdout is not None
         try:
             reply: tuple[str, Any] = pickle.load(process.stdout)
@@ -240,7 +247,7 @@ class WorkerProcess:
         return f"a process that computed {how}{hint}"
 
     def _stop(self, wait: float) -> None:
-        """End the process and close its pipes."""
+        """End the process and close its pipes; it has `wait` [s] to end by itself, 0: it is killed at once."""
         process, self.process = self.process, None
         if process is None:
             return
@@ -257,7 +264,10 @@ class WorkerProcess:
 
 
 class _Clock:
-    """Kills a process when its time is over; it can be stopped and go on."""
+    """Kills a process when its seconds are over; the clock can be stopped and go on.
+
+    over  whether it has killed the process
+    """
 
     def __init__(self, seconds: float, process: subprocess.Popen[bytes]) -> None:
         self.left, self.process, self.over = seconds, process, False
@@ -266,7 +276,7 @@ class _Clock:
         self.run(True)
 
     def run(self, on: bool) -> None:
-        """Let the clock run, or stop it."""
+        """Let the clock run (True), or stop it (False)."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -278,12 +288,18 @@ class _Clock:
             self._timer.start()
 
     def _kill(self) -> None:
+        """Kill the process, its time being over."""
         self.over = True
         self.process.kill()
 
 
 def work() -> None:
-    """Main function of a worker: read jobs and ranges from its input, write their cells to its output."""
+    """Main function of a worker: read messages from its input, write replies to its output, until the input
+    closes.
+
+    Messages are ("job", key, data), to keep a job, and ("compute", key, first, last); see `WorkerProcess._read`
+    for the replies.
+    """
     import warnings
 
     from zwidth.compile_events import listening
@@ -344,14 +360,14 @@ class ended_with_its_starter:
         self._set(False)
 
     def _set(self, on: bool) -> None:
-        """Have the system send SIGIO when the input closes, or no longer."""
+        """Have the system send SIGIO when the input closes (True), or no longer (False)."""
         with suppress(ImportError, AttributeError, OSError):
             import fcntl
             import select
 
-            own = fcntl.fcntl(0, fcntl.F_GETFL) & ~os.O_ASYNC
+            flags = fcntl.fcntl(0, fcntl.F_GETFL) & ~os.O_ASYNC
             fcntl.fcntl(0, fcntl.F_SETOWN, os.getpid())
-            fcntl.fcntl(0, fcntl.F_SETFL, own | (os.O_ASYNC if on else 0))
+            fcntl.fcntl(0, fcntl.F_SETFL, flags | (os.O_ASYNC if on else 0))
             if on and select.select([0], [], [], 0.0)[0]:  # it has closed already
                 os._exit(0)
 
@@ -379,14 +395,15 @@ _ended: list[str] = []
 
 @cache
 def versions() -> dict[str, str]:
-    """Releases of what results depend on; they are to be the same on all computers of a cluster."""
+    """Name -> release of zwidth, Python and the packages that results depend on; they are to be the same on all
+    computers of a cluster."""
     import sys
     from importlib.metadata import version
 
     from zwidth._version import __version__
 
-    own = {name: version(name) for name in ("numpy", "scipy", "numba")}
-    return {"zwidth": __version__, "python": ".".join(map(str, sys.version_info[:2])), **own}
+    packages = {name: version(name) for name in ("numpy", "scipy", "numba")}
+    return {"zwidth": __version__, "python": ".".join(map(str, sys.version_info[:2])), **packages}
 
 
 def compute_on_worker(
@@ -398,8 +415,8 @@ def compute_on_worker(
     expected  releases that this worker must have: it may have joined after the others were asked
     Raises    CannotStart  where it has others, and what `compute_range` raises
     """
-    if (own := versions()) != expected:
-        raise CannotStart(f"a worker that joined the cluster has {different(own, expected)}")
+    if (releases := versions()) != expected:
+        raise CannotStart(f"a worker that joined the cluster has {different(releases, expected)}")
     if run not in _used:
         _end_forgotten()
     with _lock:
@@ -434,7 +451,8 @@ def end_processes(run: str) -> None:
 
 
 def _end_forgotten() -> None:
-    """End the processes of runs that have gone without a word: they were killed, or their connection was lost."""
+    """End the processes of runs that took none for FORGOTTEN [s] and compute nothing: the run was killed, or its
+    connection was lost."""
     with _lock:
         since = monotonic() - FORGOTTEN
         forgotten = [run for run, used in _used.items() if used < since and not _busy.get(run)]
@@ -443,7 +461,7 @@ def _end_forgotten() -> None:
 
 
 def different(own: dict[str, str], expected: dict[str, str]) -> str:
-    """The releases that are known and differ, in words.
+    """The releases of `own` that differ from the expected, in words; "" where none does.
 
     >>> different({"zwidth": "0.1", "numpy": "2.1"}, {"zwidth": "0.2", "numpy": "2.1"})
     'zwidth 0.1 instead of 0.2'
@@ -501,11 +519,11 @@ def compute_range(attempt: Attempt, measures: int, first: int, last: int) -> Bat
             parts.append(found)
             errors.append(None)
         elif end - begin > 1:
-            ranges += reversed(_cut(begin, end))
+            ranges += reversed(_cut_in_pieces(begin, end))
         else:
             status, reason, error = found
-            none = np.full((1, measures), np.nan), np.full((1, measures), status, dtype=np.uint8)
-            parts.append(CellValues(*none, ((Note(status, reason, 1, (begin,)),),) * measures))
+            no_numbers = np.full((1, measures), np.nan), np.full((1, measures), status, dtype=np.uint8)
+            parts.append(CellValues(*no_numbers, ((Note(status, reason, 1, (begin,)),),) * measures))
             errors.append(error)
     same = len({str(error) for error in errors}) == 1
     return Batch(_join(parts, measures), tuple(events), errors[0] if same else None)
@@ -514,7 +532,8 @@ def compute_range(attempt: Attempt, measures: int, first: int, last: int) -> Bat
 def _attempt_several_times(
     attempt: Attempt, first: int, last: int, events: list[str]
 ) -> CellValues | tuple[int, str, Exception | None]:
-    """Cells first to last - 1, tried several times; or status, reason and error why there are none.
+    """Cells first to last - 1, tried several times where their process is lost; or why there are none: status,
+    reason and the error that was raised (None: out of time).
 
     events  gets a sentence for each process that was lost
     """
@@ -538,6 +557,7 @@ def _attempt_several_times(
 
 
 def _first_line(error: Exception) -> str:
+    """The first line of an error's message, for a reason."""
     return str(error).splitlines()[0] if str(error) else "without a message"
 
 
@@ -546,10 +566,10 @@ def _cells_in_words(first: int, last: int) -> str:
     return f"number {first} is" if last - first == 1 else f"numbers {first} to {last - 1} are"
 
 
-def _cut(first: int, last: int) -> list[tuple[int, int]]:
+def _cut_in_pieces(first: int, last: int) -> list[tuple[int, int]]:
     """Pieces of about equal size, none empty.
 
-    >>> _cut(0, 3)
+    >>> _cut_in_pieces(0, 3)
     [(0, 1), (1, 2), (2, 3)]
     """
     pieces = min(PIECES, last - first)

@@ -48,9 +48,11 @@ class EvaluationJob:
     @property
     def measures(self) -> tuple[str, ...]:
         """Columns at each member's points."""
-        own = self.sweep.measures
+        columns = self.sweep.measures
         return (
-            own if self.members == 1 else tuple(f"{name}, member {n}" for n in range(self.members) for name in own)
+            columns
+            if self.members == 1
+            else tuple(f"{name}, member {n}" for n in range(self.members) for name in columns)
         )
 
     @property
@@ -64,7 +66,7 @@ class EvaluationJob:
         return f"evaluation of {self.sweep.label}: {', '.join(one.name for one in self.sweep.columns)}"
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Designs first to last - 1."""
+        """Compute designs first to last - 1, the cells of a design's members side by side in its row."""
         found = self.sweep.compute(first * self.members, last * self.members)
         if self.members == 1:
             return found
@@ -113,15 +115,15 @@ class DesignJudgement:
         for n, demand in enumerate(problem.demands):
             margin = margins(self.values[:, demand.column], demand.bound, demand.at_least)
             short = np.clip(-margin, 0.0, MOST_VIOLATED)
-            violated[:, n] = np.where(np.isnan(margin), self._without(demand.column), short)
+            violated[:, n] = np.where(np.isnan(margin), self._violation_without_value(demand.column), short)
         for objective in problem.objectives:
             missing = np.isnan(self.values[:, objective.column])
-            without = np.where(missing, self._without(objective.column), 0.0)
+            without = np.where(missing, self._violation_without_value(objective.column), 0.0)
             violated[:, -1] = np.maximum(violated[:, -1], without)
         return violated
 
-    def _without(self, column: int) -> Floats:
-        """Violation by which a design counts that has no value in a column (k,), see `violations`."""
+    def _violation_without_value(self, column: int) -> Floats:
+        """By how much each design (k,) would violate a bound if it had no value in a column, see `violations`."""
         return np.asarray(MOST_VIOLATED * (1.0 + self.absent[:, column]))
 
 
@@ -189,19 +191,19 @@ class Judge:
         variables = {address.resolve(document, key): key for key in columns if key not in CIRCUMSTANCES}
         produced: dict[str, list[list[Any]]] = {}
         for design in range(count):
-            own = {}
+            values = {}
             for key in changes.keys:
                 variable = variables.get(address.resolve(document, key))
-                own[key] = address.get(document, key) if variable is None else columns[variable][design]
-            drawn = changes.of(own)
+                values[key] = address.get(document, key) if variable is None else columns[variable][design]
+            drawn = changes.of(values)
             for n, key in enumerate(changes.keys):
                 name = variables.get(address.resolve(document, key), key)
-                produced.setdefault(name, []).append([float(own[key]), *drawn[:, n].tolist()])
+                produced.setdefault(name, []).append([float(values[key]), *drawn[:, n].tolist()])
         return produced
 
     def judge(self, found: CellValues) -> DesignJudgement:
         """The columns of k designs from the cells of their job, over all operators and produced devices."""
-        cells, status = self._cells(found)
+        cells, status = self._cells_by_column(found)
         k, columns = cells.shape[:2]
         values, kinds = np.full((k, columns), np.nan), np.zeros((k, columns), dtype=np.uint8)
         for c, column in enumerate(self.problem.columns):
@@ -212,35 +214,36 @@ class Judge:
 
     def judge_produced(self, found: CellValues) -> Floats:
         """The columns (devices, k, c) of k designs as they are, and then as each of them is produced."""
-        cells, status = self._cells(found)
+        cells, status = self._cells_by_column(found)
         k, columns = cells.shape[:2]
         values = np.full((self._devices, k, columns), np.nan)
         for device in range(self._devices):
-            own = slice(device, None, self._devices)
+            members = slice(device, None, self._devices)  # this device in the hands of each operator
             for c, column in enumerate(self.problem.columns):
                 for i in range(k):
-                    values[device, i, c], _ = self._reduce(column, cells[i, c, own], status[i, c, own])
+                    values[device, i, c], _ = self._reduce(column, cells[i, c, members], status[i, c, members])
         return values
 
-    def _cells(self, found: CellValues) -> tuple[Floats, NDArray[np.uint8]]:
+    def _cells_by_column(self, found: CellValues) -> tuple[Floats, NDArray[np.uint8]]:
         """Values and status (k, c, members, w) of a job's cells; members: each operator, with each device."""
         k, columns = len(found.values), len(self.problem.columns)
         shape = (k, len(self.problem.members) * self._devices, columns, -1)
         return np.moveaxis(found.values.reshape(shape), 1, 2), np.moveaxis(found.status.reshape(shape), 1, 2)
 
     def reasons(self, found: CellValues) -> dict[str, tuple[Note, ...]]:
-        """Column -> why designs have no value there."""
+        """Column -> why designs have no value there, as the first member tells it."""
         members = len(self.problem.members) * self._devices
         width = found.values.shape[1] // (len(self.problem.columns) * members)
         return {one.name: found.notes[n * width] for n, one in enumerate(self.problem.columns)}
 
     @cached_property
     def _weights(self) -> Floats | None:
-        """Area of each position of the workspace [m²]; None without a workspace."""
+        """Area (w,) of each position of the workspace [m²]; None without a workspace."""
         return None if self._sweep.weights is None else self._sweep.weights.ravel()
 
     def _reduce(self, column: Column, cells: Floats, status: NDArray[np.uint8]) -> tuple[float, int]:
-        """Value and status of a column from its values (members, w), members as in `_cells`.
+        """Value and status of a column from its `cells` (members, w) and their status, members as in
+        `_cells_by_column`.
 
         Without a statistic a column has one value a member, its first entry, and the worst member counts. With
         one, the statistic is over all members and points.

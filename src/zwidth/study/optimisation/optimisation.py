@@ -222,7 +222,7 @@ class Optimisation(Result):
         which demands it just keeps. Of a better design that was not found this says nothing."""
         held = []
         for axis, share in zip(self.problem.variables, self.shares[self.front[place]].tolist(), strict=True):
-            held += _end_of(axis, share)
+            held += _end_reached(axis, share)
         for demand in self.problem.demands:
             if margins(self.values[place, demand.column], demand.bound, demand.at_least) <= AT_BOUND:
                 held.append(demand.text)
@@ -319,10 +319,11 @@ class Optimisation(Result):
         return settings | columns | {"knee": knee, "active": held}
 
 
-def _end_of(axis: Axis, share: float) -> list[str]:
-    """Which end of its range, or of its listed numbers, a variable has; [] between them, or for what has no order.
+def _end_reached(axis: Axis, share: float) -> list[str]:
+    """A sentence in a list: which end of its range, or of its listed numbers, a variable has at a share; []
+    between them, or for what has no order.
 
-    >>> _end_of(Axis("a", (3.0, 1.0, 2.0)), 0.1), _end_of(Axis("a", (), (0.0, 1.0)), 0.5)
+    >>> _end_reached(Axis("a", (3.0, 1.0, 2.0)), 0.1), _end_reached(Axis("a", (), (0.0, 1.0)), 0.5)
     (['a at the largest of its values'], [])
     """
     many = pieces(axis)
@@ -363,7 +364,8 @@ def undominated(costs: Floats) -> Ints:
 
 
 def ranges(costs: Floats) -> tuple[Floats, Floats]:
-    """Best cost (m,) of each objective in a front, and its range over it; 1 where that is 0."""
+    """Best cost (m,) of each objective in a front of costs (k, m), and its range (m,) over it; 1 where that is
+    0."""
     best, worst = costs.min(axis=0), costs.max(axis=0)
     return best, np.where(worst > best, worst - best, 1.0)
 
@@ -479,12 +481,12 @@ def finer_problem(problem: Problem) -> Problem | None:
     if task is None:
         return None
     finer = task_of(problem.study.document, problem.study.device, [], finer=FINER)
-    if finer is None or _points(finer) == _points(task):
+    if finer is None or _point_count(finer) == _point_count(task):
         return None
     return replace(problem, study=replace(problem.study, task=finer))
 
 
-def _points(task: Task) -> int:
+def _point_count(task: Task) -> int:
     """Number of points times directions of a task."""
     return (0 if task.positions is None else len(task.positions)) * (
         1 if task.directions is None else len(task.directions)
@@ -520,9 +522,10 @@ def _wall_to_simulate(wanted: WantedWall, point: OperatingPoint) -> tuple[float,
 
 
 def worst_point(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) -> OperatingPoint:
-    """The operating point at which the first objective is worst, held by whom it is worst with."""
+    """The operating point at which the first objective is worst, held by whom it is worst with; arguments as for
+    `simulate_front_contact`."""
     study, task, column = problem.study, problem.study.task, problem.objectives[0].column
-    # of the devices as they are, not as they are produced
+    # (members, points) of the devices as they are, the first of each, not as they are produced
     values = np.asarray(cells[column]).reshape(len(problem.members), 1 + problem.drawn, -1)[:, 0]
     worst = np.nanargmin if problem.columns[column].measure.better == "higher" else np.nanargmax
     member, place = (int(n) for n in np.unravel_index(int(worst(values)), values.shape))
@@ -531,7 +534,7 @@ def worst_point(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) 
     if task is not None and task.positions is not None:
         directions = task.directions
         many = 1 if directions is None else len(directions)
-        chosen["at"] = task.positions[place // many]
+        chosen["at"] = task.positions[place // many]  # all directions of a position lie side by side
         if directions is not None:
             chosen["direction"] = directions[place % many]
     device = study.device.with_({key: value for key, value in design.items() if key not in CIRCUMSTANCES})

@@ -84,9 +84,9 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
     archive = _Archive(problem, series)
     series.begin(archive.question)
     baseline = archive.baseline()
-    start = _own_shares(problem)
-    alone = len(problem.objectives) == 1
-    searching, spent = problem.budget - int((POLISHED_ALONE if alone else POLISHED) * problem.budget), 0
+    start = _baseline_shares(problem)
+    single = len(problem.objectives) == 1
+    searching, spent = problem.budget - int((POLISHED_ALONE if single else POLISHED) * problem.budget), 0
     for number, (shares, tell) in enumerate(generations(problem, searching, start), 1):
         if spent >= searching and len(archive.front()):
             break  # else there is nothing to polish, and the search goes on with what is left
@@ -99,7 +99,8 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
     best = archive.front()
     if len(best) and (np.abs(archive.judgement.costs(problem)[best]) < LARGEST).all():
         costs = archive.judgement.costs(problem)[best]
-        chosen = archive.best_apart() if alone else best[spread_out(costs, problem.front)]
+        chosen = archive.best_apart() if single else best[spread_out(costs, problem.front)]
+        # ranges over the front; of a single design the sizes of its costs
         weights = ranges(costs)[1] if len(best) > 1 else np.maximum(np.abs(costs[0]), 1e-300)
         spent += polish(
             problem,
@@ -159,7 +160,7 @@ class _Archive:
         return bool((absent == 1.0).all(axis=0).any())
 
     def judge(self, shares: Floats, stage: str, of: int) -> DesignJudgement:
-        """The judgement of designs (n, v), of which those that are new are computed and kept.
+        """The judgement of designs, by shares (n, v), of which those that are new are computed and kept.
 
         stage, of  what progress is reported under, and the number of designs at its end
         """
@@ -170,7 +171,9 @@ class _Archive:
                 new.append(n)
             places.append(self._places[key])
         if new:
-            found = self._run(values_at(self.problem.variables, shares[new]), stage, len(self.shares), of)
+            found = self._compute_designs(
+                values_at(self.problem.variables, shares[new]), stage, len(self.shares), of
+            )
             for name, notes in self.judging.reasons(found).items():
                 self.notes[name] += notes
             judged = self.judging.judge(found)
@@ -178,8 +181,8 @@ class _Archive:
             self.shares = np.concatenate([self.shares, shares[new]])
         return self.judgement[places]
 
-    def _run(self, designs: list[tuple[Any, ...]], stage: str, done: int, of: int) -> CellValues:
-        """Cells of the job that computes some designs."""
+    def _compute_designs(self, designs: list[tuple[Any, ...]], stage: str, done: int, of: int) -> CellValues:
+        """Compute designs, each given by the values of its variables; returns the cells of their job."""
         return self._compute(self.judging.job(designs), stage, done, of)
 
     def _compute(self, job: EvaluationJob, stage: str, done: int, of: int) -> CellValues:
@@ -189,13 +192,13 @@ class _Archive:
 
     def baseline(self) -> DesignJudgement | None:
         """The device as it is; None where it has not all of the numbers that vary."""
-        own = own_values(self.problem)
-        if any(value is None for value in own):
+        values = own_values(self.problem)
+        if any(value is None for value in values):
             return None
-        return self.judging.judge(self._run([tuple(own)], "judging the device as it is", 0, 1))
+        return self.judging.judge(self._compute_designs([tuple(values)], "judging the device as it is", 0, 1))
 
     def front(self) -> Ints:
-        """Designs that keep all demands and that no other dominates."""
+        """Places (k,) of the designs that keep all demands and that no other dominates."""
         if not len(self.shares):
             return np.zeros(0, dtype=np.int64)
         costs = self.judgement.costs(self.problem)
@@ -203,7 +206,8 @@ class _Archive:
         return undominated(costs)
 
     def best_apart(self) -> Ints:
-        """Up to STARTS designs, best first, that keep all demands and lie APART; for a single objective."""
+        """Places (k,) of up to STARTS designs, best first, that keep all demands and lie APART; for a single
+        objective."""
         kept = np.asarray(~self.judgement.violations(self.problem).any(axis=1))
         costs, shares = self.judgement.costs(self.problem)[:, 0], self.shares
         chosen: list[int] = []
@@ -215,13 +219,15 @@ class _Archive:
         return np.array(chosen, dtype=np.int64)
 
     def result(self, best: Ints, baseline: DesignJudgement | None, searched: int, polished: int) -> Optimisation:
-        """The front's designs and how they were found."""
+        """The result of the search, `best` (k,) being the places of the front's designs; others as in
+        `Optimisation`."""
         notes = {name: merge_notes(each) for name, each in self.notes.items()}
         found = Optimisation(self.problem, self.shares, self.judgement, best, baseline, searched, polished, notes)
         return replace(found, finer=self._finer(best), bars=self._bars(best), contacts=self._contacts(found))
 
     def _bars(self, best: Ints) -> Bars | None:
-        """Spread of the front's designs as produced within tolerances; None without any."""
+        """Spread of the front's designs, `best` (k,) their places, as produced within tolerances; None without
+        any."""
         if not self.problem.tolerances or not len(best):
             return None
         judging = Judge(self.problem, PRODUCED)
@@ -230,7 +236,8 @@ class _Archive:
         return bars_of(self.problem, judging.judge_produced(cells))
 
     def _finer(self, best: Ints) -> DesignJudgement | None:
-        """The judgement of the front's designs on a finer grid of the task; None where there is none."""
+        """The judgement of the front's designs, `best` (k,) their places, on a finer grid of the task; None where
+        there is none."""
         problem = finer_problem(self.problem)
         if problem is None or not len(best):
             return None
@@ -259,25 +266,26 @@ def own_values(problem: Problem) -> list[Any]:
     """The variables' values in the device file; None for one that it does not have, and for a catalogue."""
     document = problem.study.device.document
     return [
-        address.get(document, axis.key) if not axis.parts and _has(document, axis.key) else None
+        address.get(document, axis.key) if not axis.parts and _is_in_file(document, axis.key) else None
         for axis in problem.variables
     ]
 
 
-def _has(document: dict[str, Any], key: str) -> bool:
-    """Whether a device file has something at a path."""
+def _is_in_file(document: dict[str, Any], key: str) -> bool:
+    """Whether a device file has something at a path; False for a circumstance, and a path that no file can
+    have."""
     try:
         return address.exists(document, key)
-    except DeviceError:  # a circumstance, or a path that leads nowhere yet
+    except DeviceError:
         return False
 
 
-def _own_shares(problem: Problem) -> Floats:
+def _baseline_shares(problem: Problem) -> Floats:
     """The device as it is, as shares (1, v), if it lies within the bounds; else none (0, v)."""
-    own = own_values(problem)
+    values = own_values(problem)
     shares = [
         None if value is None else share_of(axis, value)
-        for axis, value in zip(problem.variables, own, strict=True)
+        for axis, value in zip(problem.variables, values, strict=True)
     ]
     inside = all(share is not None for share in shares)
     return np.array([shares], dtype=np.float64) if inside else np.zeros((0, len(shares)))
@@ -300,16 +308,16 @@ def device_files(found: Optimisation) -> Iterator[tuple[str, str]]:
     place there, such as a model, is said in a comment at its beginning.
     """
     study = found.problem.study
-    stem = _stem(study)
+    stem = _file_stem(study)
     width = len(str(len(found.front)))
     for place in range(len(found.front)):
         settings = found.settings(place)
         numbers = {key: value for key, value in settings.items() if key not in CIRCUMSTANCES}
-        source = f"{_origin(study)}, seed {found.problem.seed}, design {place + 1}"
+        source = f"{_source_text(study)}, seed {found.problem.seed}, design {place + 1}"
         given = {key: study.document[key] for key in CIRCUMSTANCES if key in study.document} | settings
         changes: list[str | tuple[str, Any]] = [*study.document.get("set", ())]
-        changes += [(path, _plain(given[key])) for key, path in PLACES.items() if key in given]
-        changes += _operator(found, settings)
+        changes += [(path, _tuple_as_list(given[key])) for key, path in PLACES.items() if key in given]
+        changes += _operator_changes(found, settings)
         text = edited_text(study.device.label, [*changes, *numbers.items()], dict.fromkeys(numbers, source))
         missing = [f"{key} = {given[key]}" for key in NO_PLACE if key in given]
         head = (
@@ -327,32 +335,36 @@ def files_there(folder: Path, study: Study) -> tuple[list[Path], list[Path]]:
     """
     if not folder.is_dir():
         return [], []
-    name = re.compile(rf"{re.escape(_stem(study))}-\d+\.toml")
+    name = re.compile(rf"{re.escape(_file_stem(study))}-\d+\.toml")
     named = [path for path in sorted(folder.iterdir()) if name.fullmatch(path.name)]
-    own = [path for path in named if _was_written_for(path, study)]
-    return own, [path for path in named if path not in own]
+    written = [path for path in named if _was_written_for(path, study)]
+    return written, [path for path in named if path not in written]
 
 
 def _was_written_for(path: Path, study: Study) -> bool:
     """Whether a file was written for a design of this study: its text names the study as its source."""
     try:
-        return f"{_origin(study)}, seed " in read_text(path, LARGEST_FILE)
+        return f"{_source_text(study)}, seed " in read_text(path, LARGEST_FILE)
     except FileError:
         return False
 
 
-def _stem(study: Study) -> str:
-    """Beginning of the names of the designs' files: the name of the device's file."""
+def _file_stem(study: Study) -> str:
+    """Beginning of the names of the designs' files: the name of the device's file without its ending."""
     return Path(study.device.label).name.removesuffix(".toml")
 
 
-def _origin(study: Study) -> str:
+def _source_text(study: Study) -> str:
     """How files name the study that their design was found in."""
     return f"optimised, study {Path(study.label).name}"
 
 
-def _operator(found: Optimisation, settings: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The changes that give a device file the operator of a design or of the study; none of those of a task."""
+def _operator_changes(found: Optimisation, settings: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield path and value of the changes that give a device file the operator of the design or of the study; the
+    operators of a task are in no file.
+
+    settings  of the design
+    """
     study = found.problem.study
     if "operator" in settings:
         table = study.operators[settings["operator"]]
@@ -365,5 +377,6 @@ def _operator(found: Optimisation, settings: Mapping[str, Any]) -> Iterator[tupl
         yield f"operator.{key}", value
 
 
-def _plain(value: Any) -> Any:
+def _tuple_as_list(value: Any) -> Any:
+    """A tuple as a list, which a device file can hold; anything else as it is."""
     return list(value) if isinstance(value, tuple) else value

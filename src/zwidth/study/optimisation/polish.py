@@ -123,28 +123,31 @@ def polish(
 
 
 def _extend_bundles(problem: Problem, designs: list[_Design], free: Ints, judge: Judges) -> int:
-    """Add to each bundle the designs that are to join it. Returns the number of designs judged."""
+    """Add to each bundle the designs that are to join it, with their derivatives. Returns the number of designs
+    judged."""
     joining = [(one, *new) for one in designs for new in one.joining]
     if not joining:
         return 0
     judged = judge(np.concatenate([neighbouring_designs(shares, free) for _, shares, _ in joining]))
     around = 2 * len(free)
-    for n, (one, shares, own) in enumerate(joining):
+    for n, (one, shares, judgement) in enumerate(joining):
         beside = judged[n * around : (n + 1) * around]
-        pieces = [
-            _values_and_derivatives(problem, g.column, shares, own, free, beside, g.sign)
-            for g in problem.objectives
+        objectives = [
+            _values_and_derivatives(problem, goal.column, shares, judgement, free, beside, goal.sign)
+            for goal in problem.objectives
         ]
-        kept = [
-            _values_and_derivatives(problem, d.column, shares, own, free, beside, d.sign) for d in problem.demands
+        demands = [
+            _values_and_derivatives(problem, demand.column, shares, judgement, free, beside, demand.sign)
+            for demand in problem.demands
         ]
-        one.bundle = [*one.bundle, _Linear(shares[free], pieces, kept)][-KEPT:]
+        one.bundle = [*one.bundle, _Linear(shares[free], objectives, demands)][-KEPT:]
         one.joining = []
     return len(joining) * around
 
 
 def _try_all(problem: Problem, tried: list[tuple[_Design, Floats]], weights: Floats, judge: Judges) -> int:
-    """Judge what is tried for each design, and let each go to the best of it. Returns the number judged."""
+    """Judge the designs (n, v) that are tried for each design, and move it to the best of them. Returns the number
+    of designs judged."""
     judged, first = judge(np.concatenate([rows for _, rows in tried])), 0
     for one, rows in tried:
         _move(problem, one, rows, judged[first : first + len(rows)], weights)
@@ -165,8 +168,11 @@ def _probes(one: _Design, free: Ints) -> Floats:
 
 
 def neighbouring_designs(shares: Floats, free: Ints) -> Floats:
-    """Designs (2 f, v) from which the derivatives by f variables are taken: a step down and one up of each, or two
-    steps to the inside at a bound."""
+    """Designs (2 f, v) from which the derivatives of a design with shares (v,) by its f free variables are taken:
+    a step down and one up of each, or two steps to the inside at a bound.
+
+    free  (f,)  indices of the free variables
+    """
     rows = np.repeat(shares[None], 2 * len(free), axis=0)
     for n, v in enumerate(free.tolist()):
         rows[2 * n : 2 * n + 2, v] += _offsets(shares[v])
@@ -174,7 +180,7 @@ def neighbouring_designs(shares: Floats, free: Ints) -> Floats:
 
 
 def _offsets(share: float) -> Floats:
-    """The two steps of a share from which a derivative is taken: down and up, both inward at a bound."""
+    """The two steps (2,) of a share from which a derivative is taken: down and up, both inward at a bound."""
     if share < STEP:
         return np.array([STEP, 2.0 * STEP])
     if share > 1.0 - STEP:
@@ -183,7 +189,7 @@ def _offsets(share: float) -> Floats:
 
 
 def gradients(shares: Floats, free: Ints, here: Floats, around: Floats) -> Floats:
-    """Derivatives (..., f) of values by the shares of f variables.
+    """Derivatives (..., f) of values by the shares of f variables, `free` (f,) their indices.
 
     here    (...)       values of the design
     around  (2 f, ...)  values of its `neighbouring_designs`
@@ -196,6 +202,7 @@ def gradients(shares: Floats, free: Ints, here: Floats, around: Floats) -> Float
     slopes = []
     for n, v in enumerate(free.tolist()):
         (a, b), fa, fb = _offsets(shares[v]), around[2 * n] - here, around[2 * n + 1] - here
+        # the slope at 0 of the parabola through 0, and fa and fb at a and b
         slopes.append((fa * b / a - fb * a / b) / (b - a))
     return np.stack(slopes, axis=-1)
 
@@ -204,19 +211,23 @@ def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats
     """The step (f,) that the linear program takes; None where none makes the design better.
 
     Where the bundle allows none, D shrinks, and designs farther away leave the bundle, until one is found.
+
+    free     (f,)  indices of the free variables
+    weights  (m,)  as for `polish`
     """
     from scipy.optimize import linprog
 
     x, count = one.shares[free], len(free)
-    own = one.judgement.costs(problem)[0]
-    gain = np.append(np.zeros(count), -1.0)
+    costs = one.judgement.costs(problem)[0]
+    objective = np.append(np.zeros(count), -1.0)  # of the unknowns (step, s): the largest s
     while one.reach >= SMALLEST:
         rows, limits = [], []  # rows @ (step, s) <= limits
         for linear in one.bundle:
             away = x - linear.shares
             if np.abs(away).max() > NEAR * one.reach:
                 continue
-            for cost, weight, (here, slope) in zip(own, weights, linear.objectives, strict=True):
+            # wanted:  here + slope (away + step) <= cost - s weight,  and of a demand <= its bound
+            for cost, weight, (here, slope) in zip(costs, weights, linear.objectives, strict=True):
                 rows.append(np.column_stack([slope / weight, np.ones(len(here))]))
                 limits.append((cost - here - slope @ away) / weight)
             for demand, (here, slope) in zip(problem.demands, linear.demands, strict=True):
@@ -226,7 +237,7 @@ def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats
         A, b = np.concatenate(rows), np.concatenate(limits)
         known = np.isfinite(A).all(axis=1) & np.isfinite(b)
         box = [(max(-one.reach, -share), min(one.reach, 1.0 - share)) for share in x]
-        found = linprog(gain, A_ub=A[known], b_ub=b[known], bounds=[*box, (0.0, None)], method="highs")
+        found = linprog(objective, A_ub=A[known], b_ub=b[known], bounds=[*box, (0.0, None)], method="highs")
         if found.status == 0 and found.x[-1] >= SMALLEST:
             return np.asarray(found.x[:count], dtype=np.float64)
         one.reach /= 4.0
@@ -237,25 +248,30 @@ def _values_and_derivatives(
     problem: Problem,
     column: int,
     shares: Floats,
-    own: DesignJudgement,
+    judgement: DesignJudgement,
     free: Ints,
     around: DesignJudgement,
     sign: float,
 ) -> tuple[Floats, Floats]:
     """Values (p,) of a column with their derivatives (p, f), less being better: at every point where the column
-    is the worst of them, else of itself."""
+    is the worst of them, else of itself.
+
+    shares, judgement  of the design;   around  judgement of its `neighbouring_designs`
+    sign               factor that makes less better
+    """
     statistic = problem.columns[column].statistic
     worst = problem.columns[column].measure.better == ("higher" if sign < 0.0 else "lower")
     if statistic == "worst" and worst:
-        here, there = own.cells[0, column], around.cells[:, column]
+        here, there = judgement.cells[0, column], around.cells[:, column]
     else:
-        here, there = own.values[0, column, None], around.values[:, column, None]
+        here, there = judgement.values[0, column, None], around.values[:, column, None]
     with np.errstate(invalid="ignore"):
         return sign * here, sign * gradients(shares, free, here, there)
 
 
 def _trials(shares: Floats, free: Ints, step: Floats) -> Floats:
-    """Designs (l, v) to which a step (f,) of the free variables leads at each of l LENGTHS, within the bounds."""
+    """Designs (l, v) to which a step (f,) of the free variables leads from shares (v,) at each of l LENGTHS,
+    within the bounds."""
     rows = np.repeat(shares[None], len(LENGTHS), axis=0)
     rows[:, free] = np.clip(rows[:, free] + np.outer(LENGTHS, step), 0.0, 1.0)
     return rows
@@ -267,8 +283,9 @@ def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement
     tried, judged  (n, v) shares, from the longest step to the shortest, and their judgement
     weights        (m,) as for `polish`
     """
-    own = one.judgement.costs(problem)
-    gains = ((own - judged.costs(problem)) / weights).min(axis=1)
+    costs = one.judgement.costs(problem)
+    # of each one tried the gain in the objective that gains least
+    gains = ((costs - judged.costs(problem)) / weights).min(axis=1)
     violated = judged.violations(problem).sum(axis=1)
     gains = np.where((violated == 0.0) & np.isfinite(gains), gains, -np.inf)
     best = int(np.argmax(gains))
@@ -280,6 +297,7 @@ def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement
     else:
         # the nearest of the designs tried in vain lies across what keeps the step from its whole length
         beyond = best - 1 if better else len(tried) - 1
+        # the best joins the bundle if it is better, and so does that nearest one, if there is one
         each = [best] * better + [beyond] * (beyond >= 0)
         one.joining = [(tried[n], judged[n : n + 1]) for n in each if np.isfinite(judged.costs(problem)[n]).all()]
         bends = np.minimum(violated, 1.0) / lengths**2

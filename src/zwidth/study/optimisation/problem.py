@@ -137,7 +137,7 @@ def study_to_optimise(document: dict[str, Any], label: str = "study") -> Study:
 
     def optimise_faults(device: Device | None, user_measures: Mapping[str, Measure], faults: TableFaults) -> None:
         found = _Requests(document, user_measures, faults)
-        _plane(document, device, found.columns, faults)
+        _workspace_plane(document, device, found.columns, faults)
 
     return study_of(document, label, bounds=True, further=tolerance_faults, further_of_measures=optimise_faults)
 
@@ -153,7 +153,7 @@ def problem_of(study: Study) -> Problem:
     if task is not None and study.wall.force is None and (held := task.demands.get("continuous_force_N")):
         study = replace(study, wall=replace(study.wall, force=held))
     found = _Requests(study.document, study.user_measures, faults)
-    study = replace(study, plane=_plane(study.document, study.device, found.columns, faults))
+    study = replace(study, plane=_workspace_plane(study.document, study.device, found.columns, faults))
     tolerances = tolerances_of(study.document, study.device, faults)
     if faults:
         raise DeviceError(in_order(faults, study.document, study.label))
@@ -175,7 +175,7 @@ def problem_of(study: Study) -> Problem:
     )
 
 
-def _plane(
+def _workspace_plane(
     document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults
 ) -> PlaneGrid | None:
     """The grid over the workspace for columns that are statistics; None with a task, or without such columns."""
@@ -210,25 +210,25 @@ class _Requests:
         self._read_demands(given)
         self._check_numbers(given)
 
-    def _place(self, name: str, better: Better, path: KeyPath) -> int | None:
+    def _column_index(self, name: str, better: Better, path: KeyPath) -> int | None:
         """Index in `columns`, to which it is added, of the column that a key names; None where it has a fault.
 
         better  which values are to count as better
         path    of the key in the study, for messages
         """
-        overall = "task" in self.document  # of a column without a statistic the worst over its points
+        has_task = "task" in self.document  # then a column without a statistic is the worst over the task's points
         try:
             column = column_named(name, self.user_measures, better)
         except ValueError as error:
             self.faults.append((path, str(error)))
             return None
-        if column.statistic is None and overall:
+        if column.statistic is None and has_task:
             judged = replace(column.measure, better=better)
             column = Column(f"worst({column.measure.name})", judged, "worst")
         if column.statistic in WITHOUT_VALUES:
             self.faults.append((path, f"{name} cannot be optimised; write worst({column.measure.name})"))
             return None
-        if column.statistic is not None and not overall and "workspace" not in self.document:
+        if column.statistic is not None and not has_task and "workspace" not in self.document:
             message = f"{name} needs a [task] or a [workspace]; add one, or write {column.measure.name}"
             self.faults.append((path, message))
             return None
@@ -242,7 +242,7 @@ class _Requests:
         for name, goal in table(given, "objectives").items():
             if goal in ("max", "min") and name:
                 better: Better = "higher" if goal == "max" else "lower"
-                at = self._place(name, better, ("optimise", "objectives", name))
+                at = self._column_index(name, better, ("optimise", "objectives", name))
                 self.objectives += [] if at is None else [Objective(at, goal)]
         if "objectives" not in given and not _misspelt("objectives", given, OptimiseSection):
             readable = isinstance(self.document.get("optimise", {}), dict)
@@ -254,20 +254,20 @@ class _Requests:
         """Take the demands from [task], and from the constraints in the table [optimise]."""
         for key, bound in demands_of(table(dict(self.document), "task")).items():
             measure, at_least = DEMANDS[key]
-            at = self._place(measure, "higher" if at_least else "lower", ("task", key))
+            at = self._column_index(measure, "higher" if at_least else "lower", ("task", key))
             self.demands += [] if at is None else [Demand(key, at, at_least, bound, True)]
         for name, text in table(given, "constraints").items():
             if not isinstance(text, str) or not text or not name:
                 continue
             path = ("optimise", "constraints", name)
             parts = _BOUND.fullmatch(text)
-            value = _finite(parts["value"]) if parts else None
+            value = _finite_number(parts["value"]) if parts else None
             if parts is None or value is None:
                 message = f'must be such as "<= 0.3" or ">= 5", with a finite number, got {text!r}'
                 self.faults.append((path, message))
                 continue
             at_least = parts["sign"] == ">="
-            at = self._place(name, "higher" if at_least else "lower", path)
+            at = self._column_index(name, "higher" if at_least else "lower", path)
             self.demands += [] if at is None else [Demand(name, at, at_least, value)]
 
     def _check_numbers(self, given: dict[str, Any]) -> None:
@@ -287,7 +287,7 @@ def _misspelt(key: str, given: Mapping[str, Any], section: type[Section]) -> boo
     return any(nearest(other, fields) == key for other in given if other not in fields)
 
 
-def _finite(text: str) -> float | None:
+def _finite_number(text: str) -> float | None:
     """The finite number that a text holds; None where it holds none."""
     try:
         value = float(text)

@@ -54,18 +54,18 @@ def generations(
         eliminate_duplicates=True,
     )
     algorithm.setup(bounds, seed=problem.seed, termination=NoTermination(), verbose=False)
-    left, within = problem.budget, budget
+    left, within = problem.budget, budget  # designs still to ask for: in all, and within the search's own budget
     while left > 0:
         asked = algorithm.ask()
         if asked is None or len(asked) == 0:
             return  # every combination of pieces has been tried
         asked = asked[: within if within > 0 else left]
         left, within = left - len(asked), within - len(asked)
-        told = []
+        told = []  # whether `tell` was called; else the algorithm has no next generation
 
         def tell(costs: Floats, violations: Floats) -> None:
             """Hand the costs (n, m) and violations (n,) of the designs asked for to the algorithm."""
-            # where a demand is violated costs are not compared, but may not be nan
+            # F, G: pymoo's names; where a demand is violated costs are not compared, but may not be nan
             F, G = np.where(np.isfinite(costs), costs, 0.0), violations[:, None]
             Evaluator().eval(StaticProblem(bounds, F=F, G=G), asked)  # noqa: B023
             algorithm.tell(infills=asked)  # noqa: B023
@@ -94,6 +94,7 @@ def _repair(problem: Problem) -> Any:
         """Moves shares of variables in pieces to the middle of their piece."""
 
         def _do(self, _: Any, X: Floats, **__: Any) -> Floats:
+            """The designs X (n, v), by shares, as they may be."""
             return settle(problem.variables, X)
 
     return Settled()
@@ -115,12 +116,13 @@ def _mutation(problem: Problem) -> Any:
             self.polynomial = PM(eta=20)  # the larger, the nearer to the parent
 
         def _do(self, bounds: Any, X: Floats, *, random_state: np.random.Generator, **more: Any) -> Floats:
+            """The designs X (n, v), by shares, changed at random."""
             X = self.polynomial._do(bounds, X, random_state=random_state, **more)
-            chance = random_state.random((3, *X.shape))
-            changes = (many > 1) & (chance[0] < 1.0 / len(axes))
-            step = np.where(chance[2] < 0.5, -1.0, 1.0) / np.maximum(many, 1)
+            whether, how, where = random_state.random((3, *X.shape))  # a variable changes, and to which piece
+            changes = (many > 1) & (whether < 1.0 / len(axes))
+            step = np.where(where < 0.5, -1.0, 1.0) / np.maximum(many, 1)
             near = np.clip(X + step, 0.0, 1.0)
-            return np.where(changes, np.where(chance[1] < CHOSEN_ANEW, chance[2], near), X)
+            return np.where(changes, np.where(how < CHOSEN_ANEW, where, near), X)
 
     return Mutated()
 
@@ -142,7 +144,7 @@ def continuous(axes: Sequence[Axis]) -> Flags:
 
 
 def settle(axes: Sequence[Axis], shares: Floats) -> Floats:
-    """Shares (k, v) within 0 and 1, those of a variable in pieces at the middle of its piece."""
+    """The shares (k, v) moved into 0 to 1, those of a variable in pieces at the middle of its piece."""
     settled = np.clip(shares, 0.0, 1.0)
     for n, axis in enumerate(axes):
         if many := pieces(axis):

@@ -290,7 +290,7 @@ def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
         steps = address.resolve(document, one.path)
     except DeviceError as error:
         return [RangeFault(fault.key, fault.message) for fault in error.faults]
-    types = {kind for subschema in schema.subschemas(steps) for kind in _types(subschema)}
+    types = {kind for subschema in schema.subschemas(steps) for kind in _json_types(subschema)}
     if "integer" in types and "number" not in types:
         return [RangeFault(one.path, "is a whole number and has no range", BY_VALUE)]
     try:
@@ -307,7 +307,7 @@ def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
     return []
 
 
-def _types(subschema: dict[str, Any]) -> Sequence[str]:
+def _json_types(subschema: dict[str, Any]) -> Sequence[str]:
     """The JSON types that a subschema allows."""
     kind = subschema.get("type", "")
     return [kind] if isinstance(kind, str) else list(kind)
@@ -400,19 +400,20 @@ class MeasuredFamily:
     def _faults_at(self, member: FamilyMember, path: str, value: float) -> list[RangeFault]:
         """What is wrong with a member at one end of a range: the value of the number at the path."""
         try:
-            self._built(member)
+            self._computer_and_operator(member)
         except (DeviceError, ValueError) as error:
             texts = [str(fault) for fault in error.faults] if isinstance(error, DeviceError) else [str(error)]
             return [RangeFault(path, f"with {value:g} the device is not valid: {text}") for text in texts]
         return []
 
-    def _built(self, member: FamilyMember) -> tuple[Controller, float, Operator | None]:
-        """Computer with whole samples of delay, the part of a sample that this lacks, and operator of a member."""
+    def _computer_and_operator(self, member: FamilyMember) -> tuple[Controller, float, Operator | None]:
+        """The computer of a member, its delay rounded down to whole samples; the rest of the delay, a share of a
+        sample; and its operator, None for nobody. Raises DeviceError, ValueError."""
         document = self.family.document(member)
         loop = document["loop"]
         unit = 1.0 if "delay_samples" in loop else float(loop["sampling_period_s"])
         key = "delay_samples" if "delay_samples" in loop else "delay_s"
-        delay = float(loop.get(key, 0.0)) / unit
+        delay = float(loop.get(key, 0.0)) / unit  # samples
         whole = floor(delay + SAME)
         if key in loop and delay >= 0.0:
             document = address.apply(document, [(dotted(("loop", key), document), whole * unit)])
@@ -426,7 +427,7 @@ class MeasuredFamily:
         return {}
 
     def _port(self, held: bool) -> MeasuredPort:
-        """The port of the measured response, with the handle if an operator holds it; made once."""
+        """The port of the measured response, with the handle if somebody holds it (`held`); made once."""
         if held not in self._ports:
             point = self.family.operating_point
             self._ports[held] = point.measured_port if held else command_port(self.response, self.period)
@@ -434,7 +435,7 @@ class MeasuredFamily:
 
     def member(self, one: MeasuredMember) -> tuple[Response, Controller]:
         """A member's response and computer. Raises ResponseError, DeviceError."""
-        controller, added, operator = self._built(one.member)
+        controller, added, operator = self._computer_and_operator(one.member)
         period = controller.sampling_period
         changed = added > SAME or abs(period / self.period - 1.0) > SAME
         if operator is None and not changed:

@@ -71,16 +71,18 @@ class Violation(Documented):
 def try_unseen_members(
     family: Family, chart: RobustChart, unseen: int, seed: int, progress: Progress
 ) -> Violation:
-    """Try `unseen` random members on walls of the robust chart of others."""
+    """Try `unseen` random members, drawn by `seed`, on walls of the robust chart of others."""
     walls, members = sample_walls(chart), list(_random_members(family, unseen, seed))
     radius, softer = np.full(unseen, np.nan), np.zeros(unseen)
     for first in range(0, unseen, AT_ONCE):
         piece = members[first : first + AT_ONCE]
-        for places, *found in _tried(family, piece, walls, lambda done: progress(STAGE, done, unseen), first):
+        for places, *found in _try_members(
+            family, piece, walls, lambda done: progress(STAGE, done, unseen), first
+        ):
             radius[first + places], softer[first + places] = found
     progress(STAGE, unseen, unseen)
     tested, violating = int(np.count_nonzero(np.isfinite(radius))), np.flatnonzero(radius > 1.0)
-    if not len(violating):
+    if not len(violating):  # the largest radius is then that of the charted members that bind
         largest = max(float(np.max(spectral_radius(chart.members[k], *walls.T))) for k in chart.binding)
         return Violation(tested, 0, largest, 0.0, {}, unseen - tested)
     worst = int(violating[np.argmax(softer[violating])])
@@ -97,50 +99,54 @@ def _random_members(family: Family, count: int, seed: int) -> Iterator[FamilyMem
         yield family.member(operator, random.random(len(family.free)))
 
 
-def _tried(
+def _try_members(
     family: Family, members: list[FamilyMember], walls: Floats, report: Callable[[int], None], before: int
 ) -> Iterator[tuple[Ints, Floats, Floats]]:
-    """Places (m,) of members and their `_worst_walls`, two (m,): of those built together, then of each of the
-    others; one that cannot be built is left out.
+    """Yield places (m,) among the members, with the spectral radius (m,) and the softening (m,) of `_worst_walls`:
+    of those built together, then of each of the others; one that cannot be built is left out.
 
-    report, before  reports the number of members tried, and how many were before these
+    walls   (k, 2)  K [N/m], B [N s/m]
+    report  called with the number of members tried
+    before  number of those tried before these
     """
     report(before)
-    alone = np.ones(len(members), dtype=bool)
+    not_built = np.ones(len(members), dtype=bool)
     for built in build_together(family, members):
         if built.table is not None:
             known = built.table.section_count > 0
             radius, softer = _worst_walls(built.table, walls, partial(spectral_radii, built.table))
-            alone[built.rows[known]] = False
+            not_built[built.rows[known]] = False
             yield built.rows[known], radius[known], softer[known]
-    rest = np.flatnonzero(alone)
-    for done, n in enumerate(rest.tolist()):
+    others = np.flatnonzero(not_built)
+    for done, n in enumerate(others.tolist()):
         if done % REPORTED == 0:
-            report(before + len(members) - len(rest) + done)
+            report(before + len(members) - len(others) + done)
         with suppress(ValueError, np.linalg.LinAlgError):
-            yield rest[done : done + 1], *_worst_walls_alone(family.loop(members[n]), walls)
+            yield others[done : done + 1], *_worst_walls_alone(family.loop(members[n]), walls)
 
 
 def _worst_walls_alone(loop: Loop, walls: Floats) -> tuple[Floats, Floats]:
-    """`_worst_walls` of a single loop. Raises what making a table of it raises."""
+    """`_worst_walls` of a single loop, radius (1,) and softening (1,), at walls (k, 2). Raises what making a table
+    of the loop raises."""
     return _worst_walls(loop.table, walls, lambda _, K, B: spectral_radius(loop, K, B))
 
 
 def _worst_walls(
     loops: LoopTable, walls: Floats, radii: Callable[[Ints, Floats, Floats], Floats]
 ) -> tuple[Floats, Floats]:
-    """Of the walls (k, 2) that are unstable for each loop of a table: the largest spectral radius, 1 where there
-    is none; and the largest stiffness [N/m] by which one with K > 0, B >= 0 must be softened to be stable.
+    """Of the walls (k, 2) that are unstable for each of n loops of a table: the largest spectral radius (n,), 1
+    where there is none; and the largest stiffness (n,) [N/m] by which one with K > 0, B >= 0 must be softened to
+    be stable, 0 where there is none.
 
     radii  numbers of loops, K and B (p,) -> spectral radii (p,)
     """
     radius, softer = np.ones(len(loops.rows)), np.zeros(len(loops.rows))
     loop, wall = np.nonzero(unstable_walls(loops, *walls.T))
     if len(loop):
-        own_radius = radii(loop, *walls[wall].T)
-        bad = own_radius > 1.0 + BAND  # unstable beyond doubt by the polynomial, and by eigenvalues, too
+        pair_radius = radii(loop, *walls[wall].T)
+        bad = pair_radius > 1.0 + BAND  # unstable beyond doubt by the polynomial, and by eigenvalues, too
         loop, wall = loop[bad], wall[bad]
-        np.maximum.at(radius, loop, own_radius[bad])
+        np.maximum.at(radius, loop, pair_radius[bad])
     quadrant = (walls[wall, 0] > 0.0) & (walls[wall, 1] >= 0.0)
     loop, wall = loop[quadrant], wall[quadrant]
     np.maximum.at(softer, loop, softenings(loops, loop, *walls[wall].T))
@@ -152,16 +158,17 @@ def sample_walls(chart: RobustChart) -> Floats:
     if not chart.regions:
         return np.empty((0, 2))
     size = np.ptp(np.vstack(chart.regions), axis=0)
-    total = sum(_lengths(arc.stiffness, arc.damping, size).sum() for arc in chart.boundary)
+    total = sum(_chord_lengths(arc.stiffness, arc.damping, size).sum() for arc in chart.boundary)
     inside = []
     for arc in chart.boundary:
-        lengths = _lengths(arc.stiffness, arc.damping, size)
+        lengths = _chord_lengths(arc.stiffness, arc.damping, size)
         along = np.concatenate([[0.0], np.cumsum(lengths)])
         count = max(int(np.ceil(EDGE_WALLS * along[-1] / total)), 2)
         at = np.linspace(0.0, along[-1], count + 1)[1:]
         points = np.column_stack([np.interp(at, along, x) for x in (arc.stiffness, arc.damping)]) / size
         behind = [np.interp(at - 1e-3 * at[-1], along, x) for x in (arc.stiffness, arc.damping)]
         ahead = points - np.column_stack(behind) / size
+        # the stable side: a step to the left of the edge is a step inside
         left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.maximum(np.hypot(*ahead.T), 1e-300)[:, None]
         inside.append((points + DEPTH * left) * size)
     low = np.vstack(chart.regions).min(axis=0)
@@ -173,7 +180,7 @@ def sample_walls(chart: RobustChart) -> Floats:
     return np.asarray(walls[in_set])
 
 
-def _lengths(K: Floats, B: Floats, size: Floats) -> Floats:
+def _chord_lengths(K: Floats, B: Floats, size: Floats) -> Floats:
     """Lengths (n - 1,) of the chords of a curve K, B (n,), in shares of the set's size (2,)."""
     return np.asarray(np.hypot(np.diff(K) / size[0], np.diff(B) / size[1]))
 
@@ -203,13 +210,13 @@ def random_measured_members(
 
     at_ends  probability of each number to lie at an end of its range: those that cut most often do
     """
-    random, own = np.random.default_rng(seed), family.family
+    random, of_device = np.random.default_rng(seed), family.family
     for _ in range(count):
-        operator = int(random.integers(max(len(own.operators), 1)))
+        operator = int(random.integers(max(len(of_device.operators), 1)))
         sweep = family.sweeps[int(random.integers(len(family.sweeps)))]
-        shares = random.random(len(own.free))
-        shares = np.where(random.random(len(own.free)) < at_ends, np.round(shares), shares)
-        yield MeasuredMember(own.member(operator, shares), sweep)
+        shares = random.random(len(of_device.free))
+        shares = np.where(random.random(len(of_device.free)) < at_ends, np.round(shares), shares)
+        yield MeasuredMember(of_device.member(operator, shares), sweep)
 
 
 def curve_of_walls(loop: MeasuredLoop, box: tuple[float, float, float, float]) -> Floats:
@@ -223,12 +230,12 @@ def curve_of_walls(loop: MeasuredLoop, box: tuple[float, float, float, float]) -
     K, B, _ = loop.walls(theta)
     pieces = [np.column_stack([K, B])]
     for kind in (-1, -2):  # of a root at z = 1, and at z = -1
-        h, w = measured_real_root(loop, kind)
+        h, w = measured_real_root(loop, kind)  # the line K + w B = h
         if not np.isfinite(h):
             continue
         if w == 0.0:
-            on_line = np.linspace(box[1], box[3], LINE_WALLS)
-            pieces.append(np.column_stack([np.full(LINE_WALLS, h), on_line]))
+            damping = np.linspace(box[1], box[3], LINE_WALLS)
+            pieces.append(np.column_stack([np.full(LINE_WALLS, h), damping]))
         else:
             stiffness = np.linspace(box[0], box[2], LINE_WALLS)
             pieces.append(np.column_stack([stiffness, (h - stiffness) / w]))
@@ -258,8 +265,8 @@ class RobustWalls:
         if not len(inside):
             return Intrusion(0.0, 0.0)
         away = shapely.distance(self.edge, shapely.points(inside))
-        buildable = inside[(inside[:, 0] > 0.0) & (inside[:, 1] >= 0.0) & (away > MEASURED_DEPTH)]
-        softer = max((self._distance_to_stiffest(*wall) for wall in buildable), default=0.0)
+        in_quadrant = inside[(inside[:, 0] > 0.0) & (inside[:, 1] >= 0.0) & (away > MEASURED_DEPTH)]
+        softer = max((self._distance_to_stiffest(*wall) for wall in in_quadrant), default=0.0)
         return Intrusion(float(away.max()), softer)
 
     def _distance_to_stiffest(self, K: float, B: float) -> float:
@@ -315,7 +322,8 @@ class MemberRadii:
         self._loops: dict[FamilyMember, Loop | None] = {}
 
     def prepare(self, wanted: Sequence[tuple[FamilyMember, Wall]]) -> None:
-        """Compute the radii of all members that can be built together; the rest waits until it is needed."""
+        """Compute the radii of those pairs of member and wall whose members can be built together; the others are
+        computed when they are needed."""
         pairs = [pair for pair in dict.fromkeys(wanted) if pair not in self._radii]
         number = {member: n for n, member in enumerate(dict.fromkeys(member for member, _ in pairs))}
         member_of = np.array([number[member] for member, _ in pairs], dtype=np.int64)
@@ -323,12 +331,12 @@ class MemberRadii:
         for built in build_together(self.family, list(number)):
             if built.table is None:
                 continue
-            row = np.full(len(number), -1)
+            row = np.full(len(number), -1)  # of each member in the table; -1: not in it
             row[built.rows] = np.arange(len(built.rows))
-            own = np.flatnonzero(row[member_of] >= 0)
-            radii = spectral_radii(built.table, row[member_of[own]], *walls[own].T)
+            in_table = np.flatnonzero(row[member_of] >= 0)
+            radii = spectral_radii(built.table, row[member_of[in_table]], *walls[in_table].T)
             self._radii.update(
-                (pairs[n], float(radius)) for n, radius in zip(own, radii, strict=True) if np.isfinite(radius)
+                (pairs[n], float(radius)) for n, radius in zip(in_table, radii, strict=True) if np.isfinite(radius)
             )
 
     def radius(self, member: FamilyMember, wall: Wall) -> float:
@@ -393,7 +401,9 @@ def _searched_walls(chart: RobustChart) -> list[tuple[Wall, tuple[int, ...]]]:
 def _worst_members(
     radii: MemberRadii, starts: Sequence[tuple[FamilyMember, Wall]]
 ) -> list[tuple[FamilyMember, float]]:
-    """The member and the spectral radius that the search from each start (member, wall) comes to."""
+    """The member and the spectral radius that the search from each start (member, wall) comes to. The searches
+    climb beside each other: the radii that they may want next are computed together.
+    """
     found: dict[int, tuple[FamilyMember, float]] = {}
     climbing = {n: _climb(radii, *start) for n, start in enumerate(starts)}
     while climbing:

@@ -83,7 +83,7 @@ class ChangedDevices:
         self._tried = set[int]()
 
     def loop(self, name: str, argument: float) -> ChangedLoop:
-        """The loop with one of the changes, by an argument. Raises what building it alone raises."""
+        """What is read of the loop with the change `name` at an argument. Raises what building it alone raises."""
         key, trial = (name, argument), self._trials[name].get(argument)
         if trial is not None and trial not in self._tried:
             self._tried.add(trial)
@@ -106,25 +106,31 @@ class ChangedDevices:
 
     @property
     def _document(self) -> dict[str, Any]:
+        """The document of the device itself."""
         return self.device.document
 
     def _build(self, trial: int) -> None:
-        """Build all changes together at all arguments of a trial."""
+        """Build all changes together at all arguments of a trial, and read their loops.
+
+        trial  number of the first step in FIRST
+        """
         # what the numbers' sources are changes no loop
         document = {key: part for key, part in self._document.items() if key != "sources"}
         grouping = DesignGrouping(document, self.device.label, {})
-        for names in self._sets():
+        for names in self._names_built_together():
             keys = [(n, x) for n in names for x in arguments(self.changes[n].at, self.changes[n].scale, trial)]
             for built in build_at_point(grouping.groups(list(self._columns(keys))), self.point):
-                own = [keys[row] for row in built.rows.tolist()]
-                self._built.update((key, (built.point, n)) for n, key in enumerate(own))
+                built_keys = [keys[row] for row in built.rows.tolist()]
+                self._built.update((key, (built.point, n)) for n, key in enumerate(built_keys))
                 # a difference of loops that are known to ten digits would have too few
                 table = table_of_points(built.point, coupled=False)
                 if table is not None:
-                    self._known.update(_changed_loops(table, own, self.optimum))
+                    self._known.update(_changed_loops(table, built_keys, self.optimum))
 
-    def _sets(self) -> Iterator[list[str]]:
-        """Names of changes whose devices consist of the same parts, and which take arrays."""
+    def _names_built_together(self) -> Iterator[list[str]]:
+        """Yield lists of names of changes whose devices can be built together: all that change numbers of the
+        device's own parts, and each by itself that may add a part. Changes of what arrays cannot hold are in
+        none."""
         together = {
             name: one for name, one in self.changes.items() if all(takes_arrays(steps) for steps, _ in one.places)
         }
@@ -140,11 +146,11 @@ class ChangedDevices:
         for row, (name, argument) in enumerate(keys):
             change = self.changes[name]
             for steps, multiple in change.places:
-                own = values.setdefault(steps, [change.at * multiple])
-                places.setdefault(steps, np.zeros(len(keys), dtype=np.int64))[row] = len(own)
-                own.append(argument * multiple)
-        for steps, own in values.items():
-            yield DesignColumn(dotted(steps, self._document), own, places[steps])
+                listed = values.setdefault(steps, [change.at * multiple])
+                places.setdefault(steps, np.zeros(len(keys), dtype=np.int64))[row] = len(listed)
+                listed.append(argument * multiple)
+        for steps, listed in values.items():
+            yield DesignColumn(dotted(steps, self._document), listed, places[steps])
 
 
 def _changed_loops(
@@ -227,6 +233,7 @@ def _extrapolate(quotient: Callable[[float], float], scale: float, factor: float
     """The most accurate derivative over the first steps of FIRST, tried in turn until one is accurate enough.
 
     quotient  step h -> difference quotient D(h)
+    scale     typical size of the function's argument
     factor    as for `_richardson`
     """
     best = _richardson(quotient, FIRST[0] * scale, scale, factor)
@@ -239,7 +246,12 @@ def _extrapolate(quotient: Callable[[float], float], scale: float, factor: float
 
 
 def _richardson(quotient: Callable[[float], float], first: float, scale: float, factor: float) -> Derivative:
-    """Richardson's table of D(h), D(h/2), ..., whose error falls by `factor` at the first halving; its best.
+    """The best entry of Richardson's table of D(h), D(h/2), ..., and its error. Column k of the table has errors
+    that fall by factor^(k + 1) at each halving: 4 where D(h) has even powers of h only, 2 where it has all.
+
+    quotient  step h -> difference quotient D(h)
+    first     the first step h
+    scale     typical size of the function's argument
 
     Where it ends in rounding, of which the last quotient is a sample, no entry is better than this rounding over
     its own step: that two entries agree may be luck.
@@ -256,11 +268,11 @@ def _richardson(quotient: Callable[[float], float], first: float, scale: float, 
         if level + 1 >= LEVELS:
             if best.error <= ENOUGH * max(abs(best.value), 1.0 / scale):
                 return best
-            if _rounding(row, best):
+            if _is_rounding(row, best):
                 break
     return Derivative(best.value, max(best.error, abs(row[0] - best.value) * 2.0 ** (best_level - level)))
 
 
-def _rounding(row: list[float], best: Derivative) -> bool:
+def _is_rounding(row: list[float], best: Derivative) -> bool:
     """Whether rounding has taken over: the newest entries are further apart than the best were."""
     return len(row) > LEVELS and abs(row[-1] - row[-2]) > 4.0 * best.error

@@ -81,7 +81,11 @@ class _Search:
         return self.size * t if self.own == 0.0 else self.own * float(np.exp(t))
 
     def grid(self, first: int) -> Iterator[float]:
-        """The next values outwards, to both sides, that the schema allows; to none where there was no device."""
+        """Yield the t of the next AT_A_TIME values outwards, to both sides, that the schema allows; none on a side
+        on which there was no device farther in.
+
+        first  number of values of each side that were tried before
+        """
         for k in range(first + 1, first + AT_A_TIME + 1):
             away = log(WIDEST) * (k / STEPS) ** 2  # closer together near the device, where the nearest is sought
             if self.own == 0.0:
@@ -94,8 +98,8 @@ class _Search:
                     yield t
 
     def brackets(self) -> list[tuple[float, float]]:
-        """Neighbours (nearer, farther) between which the goal is crossed nearer than where it is reached already,
-        the nearest first; none that are narrowed down to a jump."""
+        """Neighbouring t (nearer, farther) between which the goal is crossed nearer than where it is reached
+        already, the nearest first; none that are narrowed down to a jump."""
         reached, found = self.reached, []
         for side in (1.0, -1.0):
             known = sorted((t for t in self.samples if t * side >= 0.0), key=abs)
@@ -126,10 +130,10 @@ class _Search:
     def inside(self, a: float, b: float, tries: int) -> float:
         """The t to try next in a bracket a, b: where a straight line through its ends crosses 0, or in the middle,
         which is certain to narrow it: at every third of `tries`, and after STRAIGHT."""
-        f, g = self.samples[a], self.samples[b]
-        if not isfinite(f * g) or tries % 3 == 2 or tries > STRAIGHT:
+        at_a, at_b = self.samples[a], self.samples[b]
+        if not isfinite(at_a * at_b) or tries % 3 == 2 or tries > STRAIGHT:
             return 0.5 * (a + b)
-        t = a - f * (b - a) / (g - f)
+        t = a - at_a * (b - a) / (at_b - at_a)
         inner = 1e-3 * abs(b - a)  # not at an end, which is known
         return min(max(t, min(a, b) + inner), max(a, b) - inner)
 
@@ -167,20 +171,20 @@ def numbers_for_goal(
     if at.response is not None:
         raise fail(device.label, "response", "has no numbers to change; a goal is for a device given by a model")
     peak = largest_stiffness(at.loop)
-    own = 0.0 if peak is None else peak.stiffness
+    stiffness_now = 0.0 if peak is None else peak.stiffness
     searches, fixed = [], []
     for path, steps, value in property_numbers(device.document):
         if obstacle := number_obstacle(steps, value):
             reason = f"not varied: {obstacle}"
             fixed.append(GoalNumber(path, value, key_unit(steps), nan, nan, nan, OUT_OF_RANGE, reason))
         else:
-            searches.append(_search(device, path, steps, value, own, goal))
+            searches.append(_search(device, path, steps, value, stiffness_now, goal))
     charts = ChangedStiffness(
         device, at, {one.path: tuple(steps for steps, _ in moved_places(one.steps, 1.0)) for one in searches}
     )
     found = _search_all(searches, charts, goal, progress)
     numbers = sorted([*found, *fixed], key=lambda one: _rank(one, goal))
-    return Goal(goal, own, tuple(numbers)).about(at)
+    return Goal(goal, stiffness_now, tuple(numbers)).about(at)
 
 
 def _rank(number: GoalNumber, goal: float) -> tuple[int, float]:
@@ -190,17 +194,21 @@ def _rank(number: GoalNumber, goal: float) -> tuple[int, float]:
     return ORDER.index(number.status), number.distance if number.status == REACHED else missed
 
 
-def _search(device: Device, path: str, steps: KeyPath, value: float, own: float, goal: float) -> _Search:
-    """The search for one number, within the limits that its schema allows; it knows the device as it is."""
+def _search(device: Device, path: str, steps: KeyPath, value: float, stiffness_now: float, goal: float) -> _Search:
+    """The search for one number, within the limits that its schema allows; its only sample is the device as it is.
+
+    path, steps, value   of the number in the device file
+    stiffness_now, goal  largest stiffness of the device, and the one that is wanted [N/m]
+    """
     (lowest, highest, excluded), _ = number_limits(device.document, steps)
     lowest = np.nextafter(lowest, inf) if "lowest" in excluded else lowest
     highest = np.nextafter(highest, -inf) if "highest" in excluded else highest
     size = abs(value) or typical_size(device.document, steps)
-    return _Search(path, steps, value, size, float(lowest), float(highest), {0.0: _level(own, goal)})
+    return _Search(path, steps, value, size, float(lowest), float(highest), {0.0: _level(stiffness_now, goal)})
 
 
 def _level(stiffness: float, goal: float) -> float:
-    """ln(K / goal); -inf where no wall is stable."""
+    """ln(K / goal); -inf where no wall is stable (K = 0), nan where there is no device (K is nan)."""
     return log(stiffness / goal) if stiffness > 0.0 else -inf if stiffness == 0.0 else nan
 
 
@@ -209,11 +217,11 @@ def _search_all(
 ) -> list[GoalNumber]:
     """For each number the value with which the goal is reached: values are tried outwards, a few at a time, and
     each bracket is narrowed before going on."""
-    left = searches
+    unfinished = searches
     for first in range(0, STEPS, AT_A_TIME):
-        _chart_places([(one, t) for one in left for t in one.grid(first)], charts, goal)
+        _chart_places([(one, t) for one in unfinished for t in one.grid(first)], charts, goal)
         tries = 0
-        while crossed := [(one, ends[0]) for one in left if (ends := one.brackets())]:
+        while crossed := [(one, ends[0]) for one in unfinished if (ends := one.brackets())]:
             for one, (a, b) in crossed:
                 if one.jumps_between(a, b):
                     one.jumps.add((a, b))
@@ -221,22 +229,24 @@ def _search_all(
                 [(one, one.inside(*ends, tries)) for one, ends in crossed if ends not in one.jumps], charts, goal
             )
             tries += 1
-        left = [one for one in left if one.reached is None]
+        unfinished = [one for one in unfinished if one.reached is None]
         if progress is not None:
-            done = len(searches) if first + AT_A_TIME >= STEPS else len(searches) - len(left)
+            done = len(searches) if first + AT_A_TIME >= STEPS else len(searches) - len(unfinished)
             progress("numbers", done, len(searches))
     return [_goal_number(one, charts, goal) for one in searches]
 
 
 def _chart_places(places: list[tuple[_Search, float]], charts: ChangedStiffness, goal: float) -> None:
-    """Chart each search at a t, and note ln(K_max / goal) there."""
+    """Chart the device at each place, a search and the t of its number, and keep ln(K_max / goal) as its
+    sample."""
     K = charts.stiffnesses([(one.path, one.value(t)) for one, t in places])
     for (one, t), stiffness in zip(places, K.tolist(), strict=True):
         one.samples[t] = _level(stiffness, goal)
 
 
 def _goal_number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
-    """The result of a search: the value that reaches the goal, or the nearest to it and why none does."""
+    """The result of a search: the value that reaches the goal; else the value that comes nearest to the goal, and
+    why none reaches it."""
     known = {t: level for t, level in one.samples.items() if isfinite(level)}
     best = one.reached
     status: Status = REACHED if best is not None else OUT_OF_RANGE
@@ -253,6 +263,7 @@ def _goal_number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNum
                 NO_INFLUENCE,
                 NOWHERE,
             )
+        # not where rounding decides on which side of a jump a value lies
         edges = [end for bracket in one.jumps for end in bracket]
         clear = [t for t in known if t == 0.0 or all(abs(t - end) > NEAR_JUMP for end in edges)]
         best = min(clear, key=lambda t: (abs(known[t]), abs(t)), default=0.0)
@@ -349,10 +360,10 @@ class ChangedStiffness:
         self._grouping = DesignGrouping(document, device.label, {})
 
     def stiffnesses(self, changes: Sequence[Change]) -> Floats:
-        """Largest stiffness [N/m] with each change alone; 0 where no wall with K > 0, B >= 0 is stable, nan where
-        there is no such device, or no chart of it. Of those that cannot be built together with others a number's
-        are built in the order given, to either side of its own value up to the first that is none: to learn that
-        a place is out of reach takes longest of all.
+        """Largest stiffness (n,) [N/m] with each of n changes alone; 0 where no wall with K > 0, B >= 0 is stable,
+        nan where there is no such device, or no chart of it. Of those that cannot be built together with others a
+        number's are built in the order given, to either side of its own value up to the first that is none: to
+        learn that a place is out of reach takes longest of all.
         """
         K = np.full(len(changes), np.nan)
         charted = np.zeros(len(changes), dtype=bool)
@@ -368,13 +379,13 @@ class ChangedStiffness:
         ended = set[tuple[str, bool]]()  # numbers, and to which side of the device's own value there is none left
         for n in np.flatnonzero(~charted).tolist():
             path, value = changes[n]
-            side = path, value > self._own(path)
+            side = path, value > self._value_now(path)
             if side not in ended:
-                K[n] = self._alone(path, value)
+                K[n] = self._stiffness_alone(path, value)
                 ended |= {side} if np.isnan(K[n]) else set()
         return K
 
-    def _alone(self, path: str, value: float) -> float:
+    def _stiffness_alone(self, path: str, value: float) -> float:
         """The largest stiffness with one change [N/m], as `stiffnesses`; where it is nan, `refusals` say why."""
         document = self.device.document
         settings = [(dotted(steps, document), value) for steps in self.places[path]]
@@ -398,13 +409,13 @@ class ChangedStiffness:
         document = self.device.document
         for path in dict.fromkeys(path for path, _ in changes):
             rows = [n for n, (other, _) in enumerate(changes) if other == path]
-            at = np.zeros(len(changes), dtype=np.int64)
+            at = np.zeros(len(changes), dtype=np.int64)  # 0: the device's own value, the first of the column
             at[rows] = np.arange(1, len(rows) + 1)
-            own = self._own(path)
+            now = self._value_now(path)
             for steps in self.places[path]:
-                yield DesignColumn(dotted(steps, document), [own, *(changes[n][1] for n in rows)], at)
+                yield DesignColumn(dotted(steps, document), [now, *(changes[n][1] for n in rows)], at)
 
-    def _own(self, path: str) -> float:
+    def _value_now(self, path: str) -> float:
         """The number's value in the device; 0 where the file leaves it out."""
         document = self.device.document
         return float(address.get(document, path)) if address.exists(document, path) else 0.0

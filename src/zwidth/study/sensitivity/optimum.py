@@ -92,10 +92,10 @@ class Optimum:
         out = np.full(len(loops.rows), nan)
         most = most_degree(loops)
 
-        def several(first: int, last: int) -> None:
+        def fill_chunk(first: int, last: int) -> None:
             _stiffnesses(loops, factor_memory(loops), polynomial_memory(most), self.pieces, out, first, last)
 
-        in_chunks(several, len(out))
+        in_chunks(fill_chunk, len(out))
         return out
 
 
@@ -109,7 +109,11 @@ def _stiffnesses(
     first: int,
     last: int,
 ) -> None:
-    """Fill in `out` (N,) with `stiffness_to_first_order` of loops first to last - 1 [N/m]."""
+    """Fill in `out` (N,) with `stiffness_to_first_order` of loops first to last - 1 [N/m]; one without sections is
+    left as it is.
+
+    circle, polynomials  memory for one loop
+    """
     for i in range(first, last):
         if loops.section_count[i] == 0:
             continue
@@ -122,7 +126,11 @@ def _stiffnesses(
 
 @compiled_lean
 def _read_piece(circle: CircleFactors, polynomials: Floats, pieces: EdgePieces, k: int) -> float:
-    """r of piece k of the edge, see `EdgePieces`, for a loop; of an END of the curve its K [N/m]."""
+    """r of piece k of the edge, see `EdgePieces`, for the loop whose factors stand in `circle`; of an END of the
+    curve its K [N/m].
+
+    polynomials  (3, N + 1 or more)  coefficients of the polynomials of 1, K and B in the line of a real root
+    """
     kind, angle, N = pieces.kind[k], pieces.angle[k], circle.sizes[DEGREE]
     if kind == CURVE:
         K, B, _, _ = wall_at(circle, angle)
@@ -130,7 +138,7 @@ def _read_piece(circle: CircleFactors, polynomials: Floats, pieces: EdgePieces, 
     if kind == AXIS:
         return 0.0
     if kind == LINE:
-        outer = 0 if angle == 0.0 else N
+        outer = 0 if angle == 0.0 else N  # lowest coefficient for z = 1, highest for z = -1
         a, s, v = polynomials[0, outer], polynomials[1, outer], polynomials[2, outer]
         sK, vB = s * pieces.wall[0], v * pieces.wall[1]
         # scaled by itself: a line is the same line at any multiple, and its scale jumps with the number of roots
@@ -158,7 +166,9 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     tracer = tracer_of(loop)
     inside = [angle for angle in peak.angles if 0.0 < angle < pi]
     real = [angle for angle in peak.angles if angle not in inside]
-    pieces = [_curve(tracer, angle) for angle in inside] + [_line(tracer, angle, peak) for angle in real]
+    pieces = [_curve_piece(tracer, angle) for angle in inside] + [
+        _line_piece(tracer, angle, peak) for angle in real
+    ]
     if len(pieces) == 1 and peak.damping == 0.0:
         return _crossing(peak, "edge at B = 0", [*pieces, _Piece(AXIS, 0.0, np.array([0.0, 1.0]))], loop.period)
     if len(pieces) == 2:
@@ -167,8 +177,10 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
         raise NoAnswerError(
             "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
         )
-    alone = _Piece(CURVE if inside else END, (inside or real)[0], np.array([1.0, 0.0]))
-    return Optimum(peak, "smooth maximum" if inside else "end of the curve", _pieces(peak, [alone], np.ones(1)))
+    single = _Piece(CURVE if inside else END, (inside or real)[0], np.array([1.0, 0.0]))
+    return Optimum(
+        peak, "smooth maximum" if inside else "end of the curve", _edge_pieces(peak, [single], np.ones(1))
+    )
 
 
 class _Piece(NamedTuple):
@@ -180,7 +192,7 @@ class _Piece(NamedTuple):
     start: float = 0.0
 
 
-def _pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
+def _edge_pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
     """The pieces of edge that meet at the peak, with their weights: dK of the wall per dr of each."""
     return EdgePieces(
         kind=np.array([one.kind for one in pieces]),
@@ -192,13 +204,13 @@ def _pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
     )
 
 
-def _curve(tracer: Tracer, angle: float) -> _Piece:
+def _curve_piece(tracer: Tracer, angle: float) -> _Piece:
     """The curve of root pairs at an angle, by its normal: a unit vector across the tangent (dK, dB)."""
     _, _, dK, dB = tracer.wall(angle)
     return _Piece(CURVE, angle, np.array([dB, -dK]) / np.hypot(dB, dK))
 
 
-def _line(tracer: Tracer, angle: float, peak: Peak) -> _Piece:
+def _line_piece(tracer: Tracer, angle: float, peak: Peak) -> _Piece:
     """The line of walls with a root z = 1 at angle 0, else z = -1; sizes of its terms at the peak add to 1."""
     wall = np.array([1.0, peak.stiffness, peak.damping])
     line = tracer.line("plus" if angle == 0.0 else "minus")
@@ -214,11 +226,14 @@ def _crossing(peak: Peak, kind: Kind, pieces: list[_Piece], period: float) -> Op
         np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]) > 1e9
     ):  # parallel, as far as rounding tells
         raise NoAnswerError("two pieces of the edge touch at the largest stiffness, which then has no derivative")
-    return Optimum(peak, kind, _pieces(peak, pieces, np.linalg.solve(normals.T, np.array([1.0, 0.0]))))
+    # dK = weights . dr of the equations normals dwall = dr
+    weights = np.linalg.solve(normals.T, np.array([1.0, 0.0]))
+    return Optimum(peak, kind, _edge_pieces(peak, pieces, weights))
 
 
 def _is_maximum(tracer: Tracer, angle: float) -> bool:
-    """Whether dK/dangle vanishes at the angle, as nearly as bisection can place it."""
+    """Whether dK/dangle vanishes at the angle, as nearly as bisection can place it: a Newton step to its zero is
+    short."""
     step = 1e-6 * min(angle, pi - angle)
     low, here, high = (tracer.wall(angle + shift)[2] for shift in (-step, 0.0, step))
     curvature = (high - low) / (2.0 * step)
@@ -250,7 +265,7 @@ def second_peak_stiffness(chart: StabilityChart) -> float:
         height = np.where((walls[:, 1] >= 0.0) & (walls[:, 0] > 1e-9 * size[0]), walls[:, 0], -np.inf)
         peaks = np.isfinite(height) & (height > np.roll(height, 1)) & (height >= np.roll(height, -1))
         for wall in walls[peaks]:
-            if np.max(np.abs(wall - top) / size) > APART and not best >= wall[0]:
+            if np.max(np.abs(wall - top) / size) > APART and not best >= wall[0]:  # best is nan at first
                 best = float(wall[0])
     return best
 

@@ -112,7 +112,8 @@ def sensitivities(
 
 
 def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
-    """Sorting key: largest first, then numbers of value 0 by their derivative, then those without a result."""
+    """Sorting key: largest |logarithmic| first, then numbers of value 0 by their |derivative|, then those without
+    a result."""
     known, slope = not isnan(number.logarithmic), not isnan(number.derivative)
     return (
         not known,
@@ -165,7 +166,8 @@ class _StiffnessDerivatives:
         """
         if self.changed is None:
             return Derivative(nan, nan), "", self.obstacle
-        changed, change, delays = self.changed, self.changed.changes[name], dict[int, tuple[int, bool]]()
+        changed, change = self.changed, self.changed.changes[name]
+        delays = dict[int, tuple[int, bool]]()  # -1: of the loop below the device itself, 1: above
 
         def stiffness(argument: float) -> float:
             loop = changed.loop(name, argument)
@@ -186,7 +188,7 @@ class _StiffnessDerivatives:
             except (ValueError, np.linalg.LinAlgError) as error:
                 reason = reason or str(error)
                 continue
-            if side == "both" and delays[-1] != delays[1]:
+            if side == "both" and delays[-1] != delays[1]:  # the form of the loop changes here
                 continue
             if slope.error * change.scale <= WORTHLESS * max(1.0, abs(slope.value) * change.scale):
                 return slope, side, ""
@@ -201,13 +203,14 @@ def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]])
             yield path, Change(tuple(moved_places(steps, 1.0)), value, abs(value) or typical_size(document, steps))
     known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
     for name, paths in _groups(document).items():
-        if name.startswith("plant."):
+        if name.startswith("plant."):  # the argument is the common factor, 1 for the device itself
             parts = [known[path] for path in paths if path in known]
             yield name, Change(tuple(place for part in parts for place in moved_places(*part)), 1.0, 1.0)
 
 
 def moved_places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
-    """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
+    """Yield the steps to a number, and to its mirror image where it stands in a symmetric matrix, each with the
+    multiple of a change's argument that it takes."""
     yield steps, multiple
     if (image := mirror_image(steps)) is not None:
         yield image, multiple
@@ -217,13 +220,13 @@ def property_numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, f
     """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
     and above the diagonal."""
     for steps, value in address.number_paths(document):
-        if not _no_property(steps) and not below_diagonal(steps):
+        if not _why_no_property(steps) and not below_diagonal(steps):
             yield dotted(steps, document), steps, float(value)
     if not {"delay_samples", "delay_s"} & document.get("loop", {}).keys():
         yield "loop.delay_samples", ("loop", "delay_samples"), 0.0
 
 
-def _no_property(steps: KeyPath) -> str:
+def _why_no_property(steps: KeyPath) -> str:
     """Why a number is not a property of the linear device; "" if it is one."""
     if what := nonlinear_kind(steps):
         return f"{what}, which the chart leaves out: it is linear"
@@ -233,7 +236,7 @@ def _no_property(steps: KeyPath) -> str:
 def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Dotted path of each number that is not a property of the linear device, and why."""
     for steps, _ in address.number_paths(document):
-        if reason := _no_property(steps):
+        if reason := _why_no_property(steps):
             yield dotted(steps, document), reason
 
 
@@ -284,7 +287,9 @@ def measured_sensitivities(
     numbers = []
     varied = list(_varied_numbers(device))
     for steps, value in varied:
-        numbers.append(_sensitivity(device, response, port, operator, steps, value, chart.stiffness_max_nominal))
+        numbers.append(
+            _measured_sensitivity(device, response, port, operator, steps, value, chart.stiffness_max_nominal)
+        )
         if progress is not None:
             progress("numbers", len(numbers), len(varied))
     for steps, _ in address.number_paths(device.document):
@@ -295,7 +300,8 @@ def measured_sensitivities(
 
 
 def _varied_numbers(device: Device) -> Iterator[tuple[tuple[Any, ...], float]]:
-    """Steps and value of the numbers of the computer and the operator; the delay also where none is given."""
+    """Yield steps and value of each number of the computer and the operator; the delay also where none is
+    given."""
     given = False
     for steps, value in address.number_paths(device.document):
         if steps[0] in ("loop", "operator") and steps[1] not in ("encoder", "saturation"):
@@ -305,7 +311,7 @@ def _varied_numbers(device: Device) -> Iterator[tuple[tuple[Any, ...], float]]:
         yield DELAYS[0], 0.0
 
 
-def _sensitivity(
+def _measured_sensitivity(
     device: Device,
     response: Response,
     port: MeasuredPort,
@@ -329,10 +335,10 @@ def _sensitivity(
 
     def stiffness(change: float) -> float:
         controller, changed, holder = _with_number_changed(device, port, operator, steps, value, change)
-        return _largest(response, changed, controller, holder)
+        return _largest_nominal_stiffness(response, changed, controller, holder)
 
     step = STEP * scale
-    # whether the number can only become larger
+    # whether the number can only become larger: a delay below one step, or 0
     lowest = (steps in DELAYS and port.model.delay < STEP) or (value == 0.0 and steps not in DELAYS)
     slope, error, bend = _relative_slope(stiffness, step, largest, one_sided=lowest)
     if not bend * scale < ABRUPT * (1.0 + abs(slope) * scale):
@@ -397,8 +403,11 @@ def _relative_slope(
     return slope, error, bend
 
 
-def _largest(response: Response, port: MeasuredPort, controller: Controller, operator: Operator | None) -> float:
-    """Largest nominal stiffness [N/m] of a changed port; the certain one moves with the error as well."""
+def _largest_nominal_stiffness(
+    response: Response, port: MeasuredPort, controller: Controller, operator: Operator | None
+) -> float:
+    """Largest nominal stiffness [N/m] of a changed port, the response taken without its error: the certain
+    stiffness would move with the error as well."""
     return measured_chart(response_of_port(response, port, operator), controller).stiffness_max_nominal
 
 

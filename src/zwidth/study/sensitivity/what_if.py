@@ -111,7 +111,7 @@ Change = tuple[str, str, str, Callable[[], Loop]]
 
 
 def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
-    """The variant of a change, see `Change`, with its chart or the reason why it has none."""
+    """The variant of a change, whose four entries `Change` names, with its chart or the reason why it has none."""
     if obstacle:
         return Variant(key, label, None, None, obstacle)
     try:
@@ -124,18 +124,20 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
 def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     """Each single change of the device or its computer, see `Change`."""
     controller, plant = point.computer, point.plant
-    alone = point.ungripped_plant  # the device's own damping, without the operator's
+    ungripped = point.ungripped_plant  # the device's own damping, without the operator's
 
     def with_computer(**changes: Any) -> Callable[[], Loop]:
+        """Function that makes the loop with changed fields of its computer."""
         return lambda: Loop(plant, replace(controller, **changes))
 
     def unless(applies: object, obstacle: str) -> str:
+        """The obstacle of a change; "" where it applies."""
         return "" if applies else obstacle
 
-    flexible, damped = alone.stiffness.any(), alone.damping.any()
+    flexible, damped = ungripped.stiffness.any(), ungripped.damping.any()
     delay, low_pass = controller.delay, controller.velocity_filter
     usual = usual_filter(controller.sampling_period)
-    own = "structural damping" if flexible else "friction"
+    damping_name = "structural damping" if flexible else "friction"
 
     obstacle = unless(
         flexible, f"its {'drives are' if point.mechanism is not None else 'structure is'} rigid already"
@@ -145,7 +147,7 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     name = drives if point.mechanism is not None else "rigid structure"
     yield "rigid-drives", name, obstacle, lambda: point.in_model("rigid").loop
     faster = half_period(device, point)
-    yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)
+    yield "half-period", "half the sampling period", _estimate_obstacle(faster), lambda: Loop(plant, faster)
     obstacle = unless(delay != 0.0, "the device has no delay")
     yield "no-delay", "no delay", obstacle, with_computer(delay=0.0)
     obstacle = unless(delay != 1.0, "the device has one sample of delay")
@@ -155,9 +157,14 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     obstacle = unless(low_pass is None, "the device has a velocity filter")
     label = f"velocity through a Butterworth filter of order 2 at {usual.cutoff_Hz:.4g} Hz"
     yield "with-filter", label, obstacle, with_computer(velocity_filter=usual)
-    twice = replace(alone, damping=2.0 * alone.damping)
-    obstacle = unless(damped, f"the device has no {own}")
-    yield "twice-damping", f"twice the {own}", obstacle, lambda: Loop(point.attach_operator(twice), controller)
+    twice = replace(ungripped, damping=2.0 * ungripped.damping)
+    obstacle = unless(damped, f"the device has no {damping_name}")
+    yield (
+        "twice-damping",
+        f"twice the {damping_name}",
+        obstacle,
+        lambda: Loop(point.attach_operator(twice), controller),
+    )
     obstacle = unless(not _collocated(plant), "the sensor reads where the wall acts already")
     collocated = replace(plant, sensor=plant.actuator)
     yield "collocated", "sensor at the actuator", obstacle, lambda: Loop(collocated, controller)
@@ -176,12 +183,12 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
     damped = " with damping" if full.damping.any() or full.lagged_dampers else ""
     undamped_only = "" if damped else "there is no damping to leave out"
 
-    def same(name: Model) -> str:
-        # `in_model` returns a plant unchanged that is this model already
+    def obstacle_if_same(name: Model) -> str:
+        """Why a model is left out: the device is this model; "" where it is not."""
         return "the device as described is this model" if reduces_to_itself(name) else ""
 
     def reduces_to_itself(name: Model) -> bool:
-        """Whether the device as described is this model."""
+        """Whether the device as described is this model: then `in_model` returns its plant unchanged."""
         try:
             return point.in_model(name).ungripped_plant is full
         except (ModelError, LoadError):
@@ -202,15 +209,15 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
 
     given = "full model, all flexible coordinates" if point.mechanism is not None else "plant as given"
     yield "model-full", given, "", loop_in("full")
-    yield "model-two-mass", f"two masses{damped}", same("two-mass"), loop_in("two-mass")
+    yield "model-two-mass", f"two masses{damped}", obstacle_if_same("two-mass"), loop_in("two-mass")
     yield "model-motor-mass", f"motor mass{damped}", "", loop_in("motor-mass")
     lossless_loop = loop_in("motor-mass", lossless=True)
     yield "model-motor-mass-undamped", "motor mass without damping", undamped_only, lossless_loop
-    rigid = "" if damped else same("rigid")
+    rigid = "" if damped else obstacle_if_same("rigid")
     yield "model-rigid-undamped", "rigid without damping", rigid, loop_in("rigid", lossless=True)
 
 
-def _no_estimate(controller: Controller) -> str:
+def _estimate_obstacle(controller: Controller) -> str:
     """Why the velocity cannot be estimated at this sampling period, as a Kalman filter's may not; "" if it can."""
     try:
         controller.velocity.estimator(controller.sampling_period)

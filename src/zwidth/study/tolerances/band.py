@@ -106,6 +106,7 @@ class Coverage:
         best, at = 0.0, -1
         for d in range(len(self.dampings)):
             inside = np.flatnonzero(self._depths[d] >= members)
+            # the depth above the last of these ends falls below `members` at the next
             if len(inside) and (stiffness := float(self._ends[d][inside[-1] + 1])) > best:
                 best, at = stiffness, d
         return best, at
@@ -129,8 +130,9 @@ class Coverage:
 
 
 def refined_dampings(coverage: Coverage, counts: Sequence[int], pieces: int) -> Floats:
-    """Dampings between those of the lines: more about the largest stiffness of each count, and at both ends of its
-    band, which would begin and end flat otherwise. Bands of a free mass begin in a point, with no damping.
+    """Dampings (k,) [N s/m] between those of the lines: more about the largest stiffness of each count, and at
+    both ends of its band, which would begin and end flat otherwise. Bands of a free mass begin in a point, with no
+    damping.
 
     counts  numbers of devices whose bands are wanted
     pieces  into which each step is divided
@@ -180,16 +182,16 @@ def stable_intervals(outlines: Sequence[Floats], dampings: Floats) -> Floats:
     K = first[chord, 0] + along * (last[chord, 0] - first[chord, 0])
     order = np.lexsort((K, line))
     K, line = K[order], line[order]
-    ends, of = K.reshape(-1, 2), line[::2]  # each line has an even number of them
+    ends, line = K.reshape(-1, 2), line[::2]  # of each interval; each line has an even number of crossings
     positive = ends[:, 1] > 0.0
-    ends, of = np.maximum(ends[positive], 0.0), of[positive]
-    starts = np.searchsorted(of, np.arange(len(dampings) + 1))
+    ends, line = np.maximum(ends[positive], 0.0), line[positive]
+    starts = np.searchsorted(line, np.arange(len(dampings) + 1))
     for d in np.flatnonzero(np.diff(starts) > MOST_INTERVALS):
-        own = np.arange(starts[d], starts[d + 1])
-        shorter = np.argsort(ends[own, 0] - ends[own, 1], kind="stable")[MOST_INTERVALS:]
-        of[own[shorter]] = -1
-    ends, of = ends[of >= 0], of[of >= 0]
-    out[of, np.arange(len(of)) - np.searchsorted(of, of)] = ends
+        on_line = np.arange(starts[d], starts[d + 1])
+        shorter = np.argsort(ends[on_line, 0] - ends[on_line, 1], kind="stable")[MOST_INTERVALS:]
+        line[on_line[shorter]] = -1
+    ends, line = ends[line >= 0], line[line >= 0]
+    out[line, np.arange(len(line)) - np.searchsorted(line, line)] = ends
     return out
 
 
@@ -244,7 +246,8 @@ class EdgeJob:
         return fingerprint("edges", self.sweep.question, self.dampings)
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Devices first to last - 1. Ends that there are not are 0, 0; a device without an edge has a status."""
+        """Compute devices first to last - 1. Ends that there are not are 0, 0; a device without an edge has a
+        status."""
         values = np.zeros((last - first, len(self.measures)))
         status = np.full(values.shape, OK, dtype=np.uint8)
         notes: list[Note] = []
@@ -258,19 +261,20 @@ class EdgeJob:
         return CellValues(values, status, (tuple(notes), *[()] * (len(self.measures) - 1)))
 
     def outlines(self, first: int, last: int) -> Iterator[tuple[int, Outlines]]:
-        """Number and outlines of each of the devices first to last - 1."""
+        """Yield number and outlines of each of the devices first to last - 1: those built together before the
+        others."""
         numbers = range(first, last)
         if all(number in self.known for number in numbers):
             yield from ((number, self.known[number]) for number in numbers)
             return
-        together = np.zeros(last - first, dtype=bool)
+        built = np.zeros(last - first, dtype=bool)  # together with others
         for rows, points in self.sweep.points_together(first, last):
-            together[rows] = True
+            built[rows] = True
             for place, row in enumerate(rows.tolist()):
-                yield first + row, self._remembered(first + row, _outlines(points[place]))
-        for row in np.flatnonzero(~together).tolist():
+                yield first + row, self._remembered(first + row, _outlines_at_point(points[place]))
+        for row in np.flatnonzero(~built).tolist():
             point = self.sweep.point_alone(first + row)
-            found = _outlines(point) if isinstance(point, OperatingPoint) else Outlines(None, *point)
+            found = _outlines_at_point(point) if isinstance(point, OperatingPoint) else Outlines(None, *point)
             yield first + row, self._remembered(first + row, found)
 
     def _remembered(self, number: int, found: Outlines) -> Outlines:
@@ -280,7 +284,7 @@ class EdgeJob:
         return found
 
 
-def _outlines(point: OperatingPoint) -> Outlines:
+def _outlines_at_point(point: OperatingPoint) -> Outlines:
     """The outlines of the stable set of a device at its operating point, or why it has none."""
     try:
         if point.charted_by_response:

@@ -60,7 +60,7 @@ class Distribution:
         """
         if not self.spread:
             return 0.0
-        below, above = self._ends()
+        below, above = self._shares_below_ends()
         return float(below + (1.0 - above))
 
     @property
@@ -86,7 +86,7 @@ class Distribution:
         [3.0]
         """
         u = np.clip(np.asarray(shares, dtype=np.float64), LEAST_SHARE, 1.0 - LEAST_SHARE)
-        a, b, c = self.low, self.high, self.middle
+        a, b, c = self.low, self.high, self.middle  # ends and peak; of one with tails c is the middle
         if self.kind == "uniform":
             return np.asarray(a + u * (b - a))
         if self.kind == "triangular":
@@ -96,8 +96,8 @@ class Distribution:
             return np.asarray(np.where(rising, up, down))
         from scipy.special import ndtri
 
-        below, above = self._ends()
-        z = ndtri(below + u * (above - below))
+        below, above = self._shares_below_ends()
+        z = ndtri(below + u * (above - below))  # in standard deviations
         drawn = c * np.exp(self.spread * z) if self.kind == "lognormal" else c + self.spread * z
         return np.asarray(np.clip(drawn, a, b))
 
@@ -114,7 +114,7 @@ class Distribution:
             return np.asarray(self.middle * (x / self.middle) ** share)
         return np.asarray(self.middle + share * (x - self.middle))
 
-    def _ends(self) -> tuple[float, float]:
+    def _shares_below_ends(self) -> tuple[float, float]:
         """Shares of the whole distribution, before the cut, below low and below high."""
         from scipy.special import ndtr
 

@@ -98,8 +98,9 @@ def draws_needed(share: float) -> int:
 def count_bounds(share: float, count: int) -> tuple[int | None, int, int]:
     """Numbers of devices, of `count`, that must share a wall for it to be stable with a probability of `share`.
 
-    Returns  the number with which the probability is `share` or more with 97.5 %; None: all would not be enough.
-             ceil(share * count). The number below which it is less with 97.5 %, 1 at least
+    Returns  the number from which on the probability is `share` or more with 97.5 %; None: all would not be
+             enough. The number that is this share of them, ceil(share * count).
+             The number below which the probability is less with 97.5 %, 1 at least
     """
     from scipy.special import betaincinv
 

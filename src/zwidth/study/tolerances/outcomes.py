@@ -83,13 +83,15 @@ def outcome_counts(columns: Sequence[Column], cells: CellValues) -> dict[str, in
 
 
 def stable_marks(columns: Sequence[Column], cells: CellValues) -> Flags:
-    """Which devices render the wanted wall stably, beyond doubt."""
+    """Whether each device (n,) renders the wanted wall stably, beyond doubt."""
     column = [one.name for one in columns].index(WALL_IS_STABLE.name)
     return np.asarray(cells.values[:, column] == 1.0)
 
 
 def counted_values(column: Column, values: Floats, status: NDArray[np.uint8]) -> tuple[Floats, Flags]:
-    """A measure of all devices, and which of them have a value.
+    """A measure of all devices (n,), and which of them (n,) have a value; the others have 0 in its place.
+
+    values, status  (n,)  as computed
 
     A device without a stable wall has a largest stiffness of 0: what it can render. One that cannot be built or
     does not get to the handle's position has none.
@@ -131,7 +133,7 @@ def all_indices(columns: Sequence[Column], cells: CellValues, keys: Sequence[str
 
 
 def _outcomes(columns: Sequence[Column], cells: CellValues) -> Iterator[tuple[str, str, Floats, str]]:
-    """Name, meaning and value (devices,) of each outcome, and why it has no indices; "" where it has."""
+    """Yield name, meaning and value (devices,) of each outcome, and why it has no indices; "" where it has."""
     names = [one.name for one in columns]
     order = sorted(range(len(columns)), key=lambda n: names[n] != WALL_IS_STABLE.name)
     for n in order:
@@ -139,26 +141,26 @@ def _outcomes(columns: Sequence[Column], cells: CellValues) -> Iterator[tuple[st
         undecided = int((status == UNDECIDED).sum())
         if column.name == WALL_IS_STABLE.name:
             words = "1 where the wanted wall is stable, else 0, also for devices that cannot be built or asked"
-            none = f"{undecided} of {len(status)} verdicts are undecided" if undecided else ""
-            yield column.name, words, np.where(status == OK, values, 0.0), none
+            why_none = f"{undecided} of {len(status)} verdicts are undecided" if undecided else ""
+            yield column.name, words, np.where(status == OK, values, 0.0), why_none
         elif column.name == STIFFNESS:
             has_wall = np.where(status == OK, 1.0, 0.0)
-            none = f"{undecided} charts are undecided" if undecided else ""
+            why_none = f"{undecided} charts are undecided" if undecided else ""
             words = "1 where any wall with K > 0, B >= 0 is stable, else 0"
-            yield "has_stable_wall", words, has_wall, none
+            yield "has_stable_wall", words, has_wall, why_none
             yield (
                 column.name,
                 "largest stiffness, 0 where no wall is stable",
                 np.where(status == OK, values, 0.0),
-                none,
+                why_none,
             )
         else:
             without = int((status != OK).sum())
             if without:
                 words = f"1 where {column.name} has a value, else 0"
                 yield f"has_value({column.name})", words, np.where(status == OK, 1.0, 0.0), ""
-            none = f"{without} of {len(status)} devices have no value, and leaving them out would bias it"
-            yield column.name, column.title, np.where(status == OK, values, 0.0), none if without else ""
+            why_none = f"{without} of {len(status)} devices have no value, and leaving them out would bias it"
+            yield column.name, column.title, np.where(status == OK, values, 0.0), why_none if without else ""
 
 
 RESAMPLES: Final = 500
@@ -207,7 +209,8 @@ class Indices(Documented):
 
 
 def sampled_shares(count: int, samples: int, seed: int) -> Floats:
-    """Shares 0..1 (samples * (count + 2), count) of the devices that indices of `count` tolerances need."""
+    """Shares 0..1, an array (samples * (count + 2), count), of the devices that indices of `count` tolerances
+    need."""
     from SALib.sample import sobol
 
     problem = _salib_problem([str(n) for n in range(count)])
@@ -248,5 +251,5 @@ def indices_of(name: str, of: str, outcome: Floats, keys: Sequence[str], seed: i
 
 
 def _salib_problem(keys: Sequence[str]) -> dict[str, Any]:
-    """What SALib takes: each tolerance as a share 0..1."""
+    """The problem as SALib takes it: each tolerance a variable, by its share 0..1."""
     return {"num_vars": len(keys), "names": list(keys), "bounds": [[0.0, 1.0]] * len(keys)}

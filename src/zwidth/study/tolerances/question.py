@@ -87,12 +87,12 @@ class ToleranceQuestion:
     @property
     def columns(self) -> tuple[Column, ...]:
         """Columns to compute of each device: the largest stiffness, the study's measures, and `WALL_IS_STABLE`."""
-        own = self.study.columns
+        asked = self.study.columns
         stiffest = column_named(STIFFEST)
         if self.study.turns:
             stiffest = replace(stiffest, measure=stiffest.measure.about_moments())  # in N m/rad
-        missing = () if STIFFEST in [one.name for one in own] else (stiffest,)
-        return (*missing, *own, *((WALL_IS_STABLE,) if self.has_wall else ()))
+        missing = () if STIFFEST in [one.name for one in asked] else (stiffest,)
+        return (*missing, *asked, *((WALL_IS_STABLE,) if self.has_wall else ()))
 
     def study_of(self, axes: Sequence[Axis], columns: Sequence[Column]) -> Study:
         """The study of devices of which the n-th has the n-th value of every axis."""
@@ -119,13 +119,13 @@ def question_of(
     found: list[Tolerance] = []
     given = table(document, "draw")
     draw = given | {key: value for key, value in (("samples", samples), ("seed", seed)) if value is not None}
-    own = {key: value for key, value in document.items() if key not in OF_A_SWEEP} | (
+    of_tolerances = {key: value for key, value in document.items() if key not in OF_A_SWEEP} | (
         {"draw": draw} if draw else {}
     )
     if document.get("sampling") == "latin-hypercube":
-        own.pop("seed", None)  # it is the hypercube's
+        of_tolerances.pop("seed", None)  # it is the hypercube's
     if "draw" in document and not isinstance(document["draw"], dict):
-        own["draw"] = document["draw"]  # the schema reports it
+        of_tolerances["draw"] = document["draw"]  # the schema reports it
 
     def further(device: Device | None, faults: TableFaults) -> None:
         """Note the tolerances, and add the faults of tolerances, wall and [draw]."""
@@ -133,7 +133,7 @@ def question_of(
         faults += wall_faults(document)
         faults += draw_faults(draw)
 
-    study = study_of(own, label, needs=("tolerance",), further=further)
+    study = study_of(of_tolerances, label, needs=("tolerance",), further=further)
     aside = tuple(key for key in document if key in OF_A_SWEEP)
     return replace(question_with(study, tuple(found), draw), aside=aside)
 
@@ -215,14 +215,14 @@ def wall_is_stable(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> M
     radii = radii_at_points(point, K, B) if point.shape else np.full((), np.nan)
     known = np.where(radii < 1.0 - NEAR, 1.0, np.where(radii > 1.0 + NEAR, 0.0, np.nan))
 
-    def alone(at: tuple[int, ...]) -> float:
+    def verdict_alone(at: tuple[int, ...]) -> float:
         """1 or 0 by the verdict on the wall of one point, given by its index. Raises ChartError if undecided."""
         verdict = int(check_at(point[at], [K[at]], [B[at]]).verdict[0])
         if verdict == UNDECIDED:
             raise ChartError("the wall lies on the stability limit, as far as rounding tells")
         return float(verdict == STABLE)
 
-    return complete_pointwise(known, alone, point)
+    return complete_pointwise(known, verdict_alone, point)
 
 
 WALL_IS_STABLE: Final = Column(
@@ -291,12 +291,13 @@ def question_over(
         except DeviceError as error:
             faults.append((("at",), error.faults[0].message))
     if faults or study is None:
-        raise DeviceError([_fault(path, message, list(tolerances)) for path, message in faults])
+        raise DeviceError([_fault_of_argument(path, message, list(tolerances)) for path, message in faults])
     return question_with(study if angles is None else replace(study, at=angles), found, drawn)
 
 
 def _tolerance_tables(tolerances: Any) -> list[dict[str, Any]]:
-    """The [[tolerance]] tables of the argument. Raises TypeError, ValueError."""
+    """The argument `tolerances` as the [[tolerance]] tables of a study file. Raises TypeError for another kind of
+    argument, and ValueError for an empty one."""
     if not isinstance(tolerances, Mapping):
         raise wrong_type("tolerances", "a dictionary of paths and distributions", tolerances)
     if not tolerances:
@@ -315,8 +316,9 @@ def _tolerance_tables(tolerances: Any) -> list[dict[str, Any]]:
     ]
 
 
-def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
-    """The fault at a path of the document, under the argument that it came from; `keys` of the tolerances."""
+def _fault_of_argument(path: KeyPath, message: str, keys: list[str]) -> Fault:
+    """The fault at a path of the document that `question_over` makes, under the argument that it came from; `keys`
+    are the paths of the tolerances, in order."""
     first, *rest = path
     if first == "draw" and rest:
         first, *rest = rest

@@ -229,6 +229,7 @@ class ToleranceStudy(Result):
 
     @property
     def _sweep(self) -> Sweep:
+        """The drawn devices and their measures as the result of a sweep."""
         return Sweep(self.study, self.job, self.cells)
 
 
@@ -274,9 +275,9 @@ def tightened_axes(tolerances: Sequence[Tolerance], values: Sequence[Floats]) ->
     values  (n,) of each tolerance, of the drawn devices
     """
     axes = []
-    for n, (one, own) in enumerate(zip(tolerances, values, strict=True)):
-        narrow = one.distribution.narrowed(own, NARROWER)
-        axes.append(one.axis(np.concatenate([narrow if n == k else own for k in range(len(tolerances))])))
+    for n, (one, drawn) in enumerate(zip(tolerances, values, strict=True)):
+        narrow = one.distribution.narrowed(drawn, NARROWER)
+        axes.append(one.axis(np.concatenate([narrow if n == k else drawn for k in range(len(tolerances))])))
     return axes
 
 
@@ -291,10 +292,10 @@ def tightened(keys: Sequence[str], before: Flags, after: Flags) -> tuple[Tighten
     found = [
         Tightened(
             key,
-            share_interval(int(own.sum()), count),
-            difference_interval(int((own & ~before).sum()), int((before & ~own).sum()), count),
-            difference_interval(int((own & ~best).sum()), int((best & ~own).sum()), count),
+            share_interval(int(stable.sum()), count),
+            difference_interval(int((stable & ~before).sum()), int((before & ~stable).sum()), count),
+            difference_interval(int((stable & ~best).sum()), int((best & ~stable).sum()), count),
         )
-        for key, own in zip(keys, after, strict=True)
+        for key, stable in zip(keys, after, strict=True)
     ]
     return tuple(sorted(found, key=lambda one: -one.gain.value))

@@ -152,15 +152,16 @@ def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
     return replace(found, bands=bands, uncharted=uncharted, tightened=narrower, middle=middle)
 
 
-def _axes(question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]]) -> list[Axis]:
+def _device_axes(question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]]) -> list[Axis]:
     """The axes of devices, from the values (devices,) of the number of each tolerance."""
-    return [one.axis(own) for one, own in zip(question.tolerances, values, strict=True)]
+    return [one.axis(its_values) for one, its_values in zip(question.tolerances, values, strict=True)]
 
 
 def _measure_drawn(
     question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], compute: Compute
 ) -> tuple[SweepJob, CellValues, list[Indices]]:
-    """The job of the drawn devices, their measures, and the indices: of devices of their own, computed with them.
+    """The job of the drawn devices, their measures, and the indices, [] where none are asked for. The indices have
+    devices of their own, computed in the same job behind the drawn ones.
 
     values  (samples,) of each tolerance, of the drawn devices
     """
@@ -168,17 +169,17 @@ def _measure_drawn(
     laid = np.empty((0, len(keys)))  # shares of the devices for the indices
     if question.index_samples:
         laid = sampled_shares(len(keys), question.index_samples, question.seed)
-    both = [
-        np.concatenate([own, one.distribution.values(laid[:, n])])
-        for n, (one, own) in enumerate(zip(question.tolerances, values, strict=True))
+    all_values = [
+        np.concatenate([drawn_ones, one.distribution.values(laid[:, n])])
+        for n, (one, drawn_ones) in enumerate(zip(question.tolerances, values, strict=True))
     ]
-    whole = sweep_job(question.study_of(_axes(question, both), question.columns))
+    whole = sweep_job(question.study_of(_device_axes(question, all_values), question.columns))
     cells = compute("devices", whole, "computing devices")
     notes = tuple(tuple(note for note in each if note.first[0] < count) for each in cells.notes)
     drawn = CellValues(cells.values[:count], cells.status[:count], notes)
-    rest = CellValues(cells.values[count:], cells.status[count:], cells.notes)
-    indices = all_indices(question.columns, rest, keys, question.seed) if len(laid) else []
-    return replace(whole, sampling=question.study_of(_axes(question, values), ()).sampling), drawn, indices
+    for_indices = CellValues(cells.values[count:], cells.status[count:], cells.notes)
+    indices = all_indices(question.columns, for_indices, keys, question.seed) if len(laid) else []
+    return replace(whole, sampling=question.study_of(_device_axes(question, values), ()).sampling), drawn, indices
 
 
 def _tightened(
@@ -197,7 +198,7 @@ def _tightened(
 
 def _outcome_in_middle(question: ToleranceQuestion, compute: Compute) -> str:
     """The outcome of the device in the middle of all tolerances, to which they lead as they are tightened."""
-    axes = _axes(question, [np.array([one.distribution.middle]) for one in question.tolerances])
+    axes = _device_axes(question, [np.array([one.distribution.middle]) for one in question.tolerances])
     columns = [one for one in question.columns if one.name in (STIFFNESS, WALL_IS_STABLE.name)]
     try:
         job = sweep_job(question.study_of(axes, columns))
@@ -210,7 +211,8 @@ def _outcome_in_middle(question: ToleranceQuestion, compute: Compute) -> str:
 def _bands(
     question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], compute: Compute
 ) -> tuple[tuple[Band, ...], int]:
-    """Bands of the chart, one for each quantile, the likeliest walls first; and how many devices lack one."""
+    """Bands of the chart, one for each quantile, the likeliest walls first; and how many drawn devices have no
+    chart."""
     shares = question.quantiles[::-1]
     counts = [count_bounds(share, question.samples) for share in shares]
     wanted = [count for each in counts for count in each if count]
@@ -241,10 +243,13 @@ def _coverage(
 
     Returns  the count of stable devices, and how many have no chart and count as not stable
     """
-    job = sweep_job(question.study_of(_axes(question, values), [WALL_IS_STABLE] if question.has_wall else []))
+    job = sweep_job(
+        question.study_of(_device_axes(question, values), [WALL_IS_STABLE] if question.has_wall else [])
+    )
     first = EdgeJob(job, np.empty(0))
     top = ABOVE * highest_damping(first, TRIED) or 1.0
     dampings, intervals = np.empty(0), np.empty((question.samples, 0, MOST_INTERVALS, 2))  # as of `Coverage`
+    # lines to compute next, number of rounds of finer lines, and of all rounds
     wanted, rounds, n = np.linspace(0.0, top, LINES + 1), 0, 0
     while True:
         edges = compute(f"edges-{n}", replace(first, dampings=wanted), "computing charts of devices")
@@ -268,7 +273,7 @@ def _with_tried_walls(question: ToleranceQuestion, bands: Sequence[Band], comput
     if not walls:
         return tuple(bands)
     count, values = question.samples, drawn_values(question.tolerances, question.seed, question.samples, UNSEEN)
-    axes = _axes(question, [np.tile(own, len(walls)) for own in values])
+    axes = _device_axes(question, [np.tile(its_values, len(walls)) for its_values in values])
     axes += [
         Axis("stiffness_N_per_m", tuple(wall.stiffness for wall in walls for _ in range(count))),
         Axis("damping_Ns_per_m", tuple(wall.damping for wall in walls for _ in range(count))),
@@ -352,14 +357,14 @@ class MemberChanges:
         """
         columns = []
         for n, one in enumerate(self.tolerances):
-            own = float(design[one.key])
-            changed = self.factors[:, n] * own + self.offsets[:, n]
+            value = float(design[one.key])
+            changed = self.factors[:, n] * value + self.offsets[:, n]
             columns.append(changed)
             for tie in one.ties:
                 if tie.power is None:
                     columns.append(tie.factor * changed)
                 else:
-                    columns.append(float(design[tie.key]) * (changed / own) ** tie.power)
+                    columns.append(float(design[tie.key]) * (changed / value) ** tie.power)
         return np.stack(columns, axis=1) if columns else np.empty((len(self.factors), 0))
 
 

@@ -62,10 +62,10 @@ def tolerances_of(document: dict[str, Any], device: Device | None, faults: Table
     """
     found, taken = [], SetNumbers()
     for n, table in tables(document, KIND):
-        own: TableFaults = list(_width_faults(table))
-        tolerance = _tolerance(table, device, taken, own)
-        faults += [((KIND, n, *path), message) for path, message in own]
-        if tolerance is not None and not own:
+        table_faults: TableFaults = list(_width_faults(table))
+        tolerance = _tolerance(table, device, taken, table_faults)
+        faults += [((KIND, n, *path), message) for path, message in table_faults]
+        if tolerance is not None and not table_faults:
             found.append(tolerance)
     return tuple(found)
 
@@ -79,10 +79,10 @@ def _width_faults(table: dict[str, Any]) -> Iterator[TableFault]:
     allowed = {key for way in ways for key in way}
     for key in WIDTH_KEYS:
         if key in table and key not in allowed:
-            yield (key,), f"is not the width of a {kind} distribution; give {_listed(ways)}"
+            yield (key,), f"is not the width of a {kind} distribution; give {_ways_in_words(ways)}"
     used = [way for way in ways if any(key in table for key in way)]
     if not used and not any(key in table for key in WIDTH_KEYS):
-        yield (), f"has no width; give {_listed(ways)}"
+        yield (), f"has no width; give {_ways_in_words(ways)}"
     if len(used) > 1:
         yield (used[1][0],), f"and {used[0][0]} exclude each other; remove one of them"
     if ("low" in table) != ("high" in table):
@@ -98,7 +98,7 @@ def _width_faults(table: dict[str, Any]) -> Iterator[TableFault]:
         )
 
 
-def _listed(ways: Sequence[Sequence[str]]) -> str:
+def _ways_in_words(ways: Sequence[Sequence[str]]) -> str:
     """Ways of giving a width, in words."""
     *first, last = [" and ".join(way) for way in ways]
     return f"{', '.join(first)} or {last}"
@@ -107,7 +107,11 @@ def _listed(ways: Sequence[Sequence[str]]) -> str:
 def _tolerance(
     table: dict[str, Any], device: Device | None, taken: SetNumbers, faults: TableFaults
 ) -> Tolerance | None:
-    """The tolerance of a table; None where it has faults, which are added, or some that the schema reports."""
+    """The tolerance of a table; None where it has faults, which are added, or some that the schema reports.
+
+    taken   the numbers that tolerances before this one set; those of this one are added
+    faults  those of its width already; the others are added
+    """
     key = table.get("key")
     if not isinstance(key, str) or not key or device is None:
         return None
@@ -118,23 +122,23 @@ def _tolerance(
     if faults:
         return None
     value = address.get(device.document, key) if address.exists(device.document, key) else None
-    own = float(value) if is_number(value) else None
-    made = _distribution(table, key, own, device.document, faults)
+    now = float(value) if is_number(value) else None
+    made = _distribution(table, key, now, device.document, faults)
     if made is None or faults:
         return None
     distribution, relative = made
     path = dotted(address.resolve(device.document, key), device.document)
     mirror = mirrored(device.document, key)  # an element of a symmetric matrix has no value of its own
-    alone = faults_with(device.document, key, () if mirror is None else (Tie(mirror),))
-    distribution = _cut_at_obstacles(distribution, path, alone)
-    faults += beyond_faults(key, path, own, _width_key(table), distribution, alone)
+    without_ties = faults_with(device.document, key, () if mirror is None else (Tie(mirror),))
+    distribution = _cut_at_obstacles(distribution, path, without_ties)
+    faults += beyond_faults(key, path, now, _width_key(table), distribution, without_ties)
     if faults:
         return None
     drawn = {"key": key, "values": [distribution.low, distribution.high], "tie": table.get("tie")}
     ties = tuple(ties_of(drawn, key, device, taken, faults, KIND))
     if ties and not faults:
-        together = faults_with(device.document, key, ties)
-        faults += beyond_faults(key, path, own, _width_key(table), distribution, together)
+        with_ties = faults_with(device.document, key, ties)
+        faults += beyond_faults(key, path, now, _width_key(table), distribution, with_ties)
     return Tolerance(key, path, distribution, relative, unit_of(device.document, key), ties)
 
 
@@ -156,7 +160,7 @@ def _cut_at_obstacles(law: Distribution, path: str, faults_at: FaultsOf) -> Dist
 
 
 def _key_fault(document: dict[str, Any], key: str) -> str:
-    """What is wrong with a key that no real number of the device file has; "" for nothing."""
+    """Message: why the key of a tolerance leads to no real number of the device file; "" where it leads to one."""
     if key in CIRCUMSTANCES:
         return f"'{key}' is a circumstance of the study; a tolerance is of a number of the device file"
     for _, message in key_faults(document, key, []):
@@ -236,7 +240,9 @@ def _with_tails(
         deviation = table["standard_deviation"] if percent is None else abs(value) * percent / 100.0
     made = (lognormal if kind == "lognormal" else normal)(middle, deviation, limits, cut)
     if not made.low <= middle <= made.high or not made.low < made.high:
-        message = f"and high have their middle at {middle:.6g}, which '{key}' may not be; {_allowed(limits)}"
+        message = (
+            f"and high have their middle at {middle:.6g}, which '{key}' may not be; {_limits_in_words(limits)}"
+        )
         faults.append((("low",), message))
         return None
     return made
@@ -262,7 +268,7 @@ def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: T
     return Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
 
 
-def _allowed(limits: NumberLimits) -> str:
+def _limits_in_words(limits: NumberLimits) -> str:
     """The values that a number of the device file may have, in words."""
     words = []
     if limits.least > -inf:
@@ -273,29 +279,30 @@ def _allowed(limits: NumberLimits) -> str:
 
 
 def _limits(steps: KeyPath) -> NumberLimits:
-    """The widest limits that the schema sets for the number at a path."""
+    """The widest limits that the schema sets for the number at a path, by any of its forms."""
     numbers = [kind for kind in schema.subschemas(steps) if kind.get("type") == "number"]
     if not numbers:
         return NumberLimits()
+    # of two equal limits the one that is allowed itself is wider: its second entry, 0, compares so
     least = min(_limit(kind, -inf, ("gt", "exclusiveMinimum"), ("ge", "minimum")) for kind in numbers)
     most = max(_limit(kind, inf, ("lt", "exclusiveMaximum"), ("le", "maximum"), -1) for kind in numbers)
     return NumberLimits(least[0], most[0], least[1] > 0, most[1] < 0)
 
 
 def _limit(
-    kind: dict[str, Any], none: float, without: Sequence[str], within: Sequence[str], sign: int = 1
+    subschema: dict[str, Any], unlimited: float, without: Sequence[str], within: Sequence[str], sign: int = 1
 ) -> tuple[float, int]:
-    """A limit that a subschema sets, or `none`; and `sign` where the limit itself is not allowed, else 0.
+    """A limit that a subschema sets, or `unlimited`; and `sign` where the limit itself is not allowed, else 0.
 
     without, within  keys of a limit that is not allowed itself, and of one that is
     """
     for key in without:
-        if key in kind:
-            return float(kind[key]), sign
+        if key in subschema:
+            return float(subschema[key]), sign
     for key in within:
-        if key in kind:
-            return float(kind[key]), 0
-    return none, 0
+        if key in subschema:
+            return float(subschema[key]), 0
+    return unlimited, 0
 
 
 DIGITS: Final = 4  # of a number that a message advises
@@ -310,6 +317,7 @@ def beyond_faults(
     path       of its number in full
     value      of the number in the device file; None: it has none
     width_key  the first of the keys of its table that give the width
+    faults_at  value of the number -> faults of the device with it
     """
     by_ends = width_key == "low" and not law.spread  # low and high are all that is drawn
     # what is advised about low has nothing to do with high, nor with the middle between them
@@ -321,27 +329,27 @@ def beyond_faults(
         fault = faults_at(law.middle)[0]
         by_low = "move low and high to values that it may have"
         advice = by_low if width_key == "low" else "correct what is tied to it"
-        return [((width_key,), f"{leads}; with {law.middle:.6g}, {_in_words(fault, path)}; {advice}")]
+        return [((width_key,), f"{leads}; with {law.middle:.6g}, {_fault_in_words(fault, path)}; {advice}")]
     found = [one for end in (law.low, law.high) if (one := obstacle(faults_at, start, end)) is not None]
     if not by_ends:
         advice = _narrower_advice(law, width_key, [one.last for one in found], faults_at) if found else ""
-        return [((width_key,), f"{leads}; {_at_end(one, path)}; {advice}") for one in found[:1]]
+        return [((width_key,), f"{leads}; {_obstacle_in_words(one, path)}; {advice}") for one in found[:1]]
     faults: TableFaults = []
     for one in found:
         rising = one.end == law.low
         limit = _rounded(one.last, lambda end: not faults_at(end), up=rising)
         advice = f"give {'low' if rising else 'high'} = {limit} or {'more' if rising else 'less'}"
-        faults.append((("low" if rising else "high",), f"{leads}; {_at_end(one, path)}; {advice}"))
+        faults.append((("low" if rising else "high",), f"{leads}; {_obstacle_in_words(one, path)}; {advice}"))
     return faults
 
 
-def _at_end(one: Obstacle, path: str) -> str:
+def _obstacle_in_words(one: Obstacle, path: str) -> str:
     """What is wrong at the end of a distribution, in words; with the value there where other numbers matter."""
-    words = _in_words(one.faults[0], path)
+    words = _fault_in_words(one.faults[0], path)
     return words if one.is_of(path) else f"with {one.end:.6g}, {words}"
 
 
-def _in_words(fault: Fault, path: str) -> str:
+def _fault_in_words(fault: Fault, path: str) -> str:
     """A fault without the advice that it gives about a single device; "it" for the number at the path in full."""
     first = fault.message.split("; ")[0]
     if first.count("(") > first.count(")"):
@@ -379,8 +387,8 @@ def _narrower_advice(law: Distribution, width_key: str, ends: Sequence[float], f
 
 
 def _rounded(value: float, fits: Callable[[float], bool], *, up: bool = False) -> str:
-    """A number with few digits next to a value that fits: the nearest one if it fits, else one that lies below, or
-    above it.
+    """A number with few digits next to a value that fits, as text: the nearest one if it fits, else one that lies
+    below it, or above it where `up`.
 
     >>> _rounded(0.0123456, lambda x: x <= 0.0123456), _rounded(25.0, lambda x: x < 25.0)
     ('0.01234', '24.99')

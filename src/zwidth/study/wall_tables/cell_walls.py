@@ -133,14 +133,20 @@ def cell_walls(question: CellQuestion, cell: int) -> CellWalls:
     try:
         every = range(question.sectors.count)
         slots = [list(every)] if question.slots == 1 else [list(every), *([one] for one in every)]
-        pairs = [_Slot(question, cell, sectors).walls() for sectors in slots]
-    except _Failed as none:
-        return CellWalls(none.status, none.reason)
+        pairs = [_TableSearch(question, cell, sectors).walls() for sectors in slots]
+    except _Failed as failure:
+        return CellWalls(failure.status, failure.reason)
     return CellWalls(OK, "", np.array([top for top, _ in pairs]), np.stack([ranges for _, ranges in pairs]))
 
 
-class _Slot:
-    """The search for the safe walls of one cell over some sectors of directions."""
+class _TableSearch:
+    """The search for the safe walls of one cell over some sectors of directions: the numbers of one of its tables.
+
+    In its methods `bands` (levels, 2) are the lowest and the highest stiffness of each band [N/m].
+
+    cell     number of the cell in the grid
+    sectors  numbers of the sectors: one, or all
+    """
 
     def __init__(self, question: CellQuestion, cell: int, sectors: Sequence[int]) -> None:
         self.question, self.cell, self.sectors = question, cell, sectors
@@ -150,6 +156,7 @@ class _Slot:
     def walls(self) -> tuple[float, Floats]:
         """Largest stiffness [N/m], ranges (levels, 2) of damping [N s/m]. Raises _Failed where nothing is safe."""
         question = self.question
+        # steps 1 and 2 of the file, on ever finer lattices
         for halvings in range(HALVINGS + 1):
             samples, coarse = self._lattice(halvings)
             edges = self._edges(samples)
@@ -162,26 +169,26 @@ class _Slot:
         if np.isnan(limits.centre).all():
             raise _Failed(NO_VALUE, NOTHING_COMMON)
         if question.narrowing and question.grid.dimensions:
-            tightest = Tightest(self.sampler, samples, intervals, limits.centre)
+            tightest = Tightest(self.sampler, samples, intervals, limits.centre)  # steps 3, 4 and 5
             self._search(tightest, limits, bands)
             self._attack(tightest, limits, bands)
             self._try_eigenvalues(tightest, limits, bands)
         ranges = np.array([_with_margin(low, high, question.margin) for low, high in limits.ranges.tolist()])
-        if not (ranges[0, 0] < ranges[0, 1]):
+        if not (ranges[0, 0] < ranges[0, 1]):  # the lowest band has none, and so no rectangle begins at 0
             raise _Failed(NO_VALUE, NOTHING_COMMON)
         return top / (1.0 + question.margin), ranges
 
     def _lattice(self, halvings: int) -> tuple[CellSamples, Flags]:
-        """Samples of the lattice, its spacing halved so often, and which of them belong to that of every second
-        point."""
+        """Samples (n,) of the lattice, its spacing halved so often, and which of them (n,) belong to the lattice
+        of every second point."""
         d = self.question.grid.dimensions
-        if d == 0:
+        if d == 0:  # no workspace: one sample without coordinates
             return CellSamples(np.empty((1, 0)), np.zeros(1, dtype=np.int64), np.empty((1, 0))), np.ones(
                 1, dtype=np.bool_
             )
-        of_postures = ((POSTURES - 1) << halvings) + 1
-        of_directions = ((DIRECTIONS[d][0 if self.question.sectors.parts == 1 else 1] - 1) << halvings) + 1
-        return self.sampler.lattice(of_postures, of_directions)
+        postures_per_axis = ((POSTURES - 1) << halvings) + 1
+        directions_per_axis = ((DIRECTIONS[d][0 if self.question.sectors.parts == 1 else 1] - 1) << halvings) + 1
+        return self.sampler.lattice(postures_per_axis, directions_per_axis)
 
     def _edges(self, samples: CellSamples) -> LoopEdgeChords:
         """The edges at n samples with each hand, hand after hand. Raises _Failed where a posture cannot be had, or
@@ -279,25 +286,26 @@ class _Slot:
         for j in np.flatnonzero(ranges[:, 0] < ranges[:, 1]).tolist():
             for side in (0, 1):
                 for stiffness in bands[j].tolist():
-                    own = CellSamples.joined([tightest.of_limit(side, j), self.sampler.anywhere(STRANGERS)])
-                    starts.append(own)
+                    starts.append(
+                        CellSamples.joined([tightest.of_limit(side, j), self.sampler.anywhere(STRANGERS)])
+                    )
                     K.append(stiffness)
                     B.append(float(ranges[j, side]))
         if not starts:
             return tightest.samples[np.empty(0, dtype=np.int64)]
-        counts = np.array([len(own) for own in starts])
-        of = np.repeat(np.arange(len(starts)), counts)
-        samples, stiffness, damping = CellSamples.joined(starts), np.array(K), np.array(B)
-        radius = self._radii(samples, stiffness[of], damping[of])
-        order = np.lexsort((-radius, of))  # of each corner the largest first
-        first = np.cumsum(counts) - counts
-        kept = order[(first[:, None] + np.arange(WALKERS)).ravel()]
-        samples, of, radius = samples[kept], of[kept], radius[kept]
+        counts = np.array([len(one) for one in starts])
+        corner = np.repeat(np.arange(len(starts)), counts)
+        samples, stiffness, damping = CellSamples.joined(starts), np.array(K), np.array(B)  # K, B of each corner
+        radius = self._radii(samples, stiffness[corner], damping[corner])
+        order = np.lexsort((-radius, corner))  # of each corner the largest first
+        first_of_corner = np.cumsum(counts) - counts
+        kept = order[(first_of_corner[:, None] + np.arange(WALKERS)).ravel()]
+        samples, corner, radius = samples[kept], corner[kept], radius[kept]
         step = STEP
         for _ in range(PACES):
             for _ in range(STRIDES):
                 other = self.sampler.beside(samples, step)
-                found = self._radii(other, stiffness[of], damping[of])
+                found = self._radii(other, stiffness[corner], damping[corner])
                 samples, radius = other.where(found > radius, samples), np.maximum(found, radius)
             step *= SHRINK
         best = np.arange(len(starts)) * WALKERS + radius.reshape(-1, WALKERS).argmax(axis=1)
@@ -311,7 +319,8 @@ class _Slot:
 
 
 def _with_margin(low: float, high: float, margin: float) -> tuple[float, float]:
-    """The range of damping whose numbers, times any factor from 1 - margin to 1 + margin, lie from low to high."""
+    """The range of damping whose numbers, times any factor from 1 - margin to 1 + margin, lie from low to high;
+    NONE where there is none."""
     if not low < high:
         return NONE
     low = low / (1.0 - margin) if low >= 0.0 else low / (1.0 + margin)
@@ -350,12 +359,12 @@ class Tightest:
         """
         bands, count = len(centre), len(samples)
         group = self.sampler.group(samples)
-        groups = [(g, np.flatnonzero(group == g)) for g in np.unique(group).tolist()]
+        groups = [(g, np.flatnonzero(group == g)) for g in np.unique(group).tolist()]  # number, rows of `samples`
         for j in np.flatnonzero(~np.isnan(centre)):
-            own = around(intervals[:, j], centre[j])
-            for side, of_all in enumerate((own[:, 0], -own[:, 1])):
-                tightness = np.nan_to_num(of_all, nan=-np.inf).reshape(-1, count).max(axis=0)
-                k = side * bands + int(j)
+            ends = around(intervals[:, j], centre[j])
+            for side, rising in enumerate((ends[:, 0], -ends[:, 1])):  # the larger, the tighter
+                tightness = np.nan_to_num(rising, nan=-np.inf).reshape(-1, count).max(axis=0)  # over the hands
+                k = side * bands + int(j)  # column of this limit in `damping`
                 known = tightness[np.isfinite(tightness)]
                 self.spread[k] = max(self.spread[k], np.ptp(known) if len(known) else 0.0)
                 for g, rows in groups:
@@ -366,11 +375,12 @@ class Tightest:
 
     def near(self, step: float) -> CellSamples:
         """The samples from which a step, a share of the cell, may lead to the tightest of all: those that are less
-        apart from it than REACH times that share of what the limit differs by within the cell."""
+        apart from it in damping than REACH times that share of what the limit differs by within the cell."""
         known = np.isfinite(self.damping)
         close = known & (self.damping >= self.damping.max(axis=0) - REACH * step * self.spread)
         rows = np.flatnonzero(close.ravel())
         places = np.column_stack([self.samples.posture, self.samples.sector, self.samples.direction])[rows]
+        # one that is the tightest of several limits once, in the order of the groups and limits
         return self.samples[rows[np.sort(np.unique(places, axis=0, return_index=True)[1])]]
 
     def of_limit(self, side: int, band: int) -> CellSamples:
@@ -385,26 +395,25 @@ class Limits:
     """Limits of damping of each band, with what they are narrowed by.
 
     centre     (bands,)    damping in the middle of the range [N s/m]; nan where nothing is left
-    extreme    (bands, 2)  tightest lowest and highest damping of the samples; narrowing (bands, 2) of both
+    extreme    (bands, 2)  tightest lowest and highest damping of the samples
+    narrowing  (bands, 2)  by how much each of both is moved inwards [N s/m]; as an argument False: by nothing
     intervals  (N, bands, GAPS, 2)  stable ones at the lattice's samples
     coarse     (N,)  which samples belong to the lattice of every second point
     """
 
     def __init__(self, intervals: Floats, coarse: Flags, narrowing: bool) -> None:
         count = intervals.shape[1]
-        self.centre, self.extreme, self.narrowing = (
-            np.full(count, np.nan),
-            np.zeros((count, 2)),
-            np.zeros((count, 2)),
-        )
+        self.centre = np.full(count, np.nan)
+        self.extreme, self.narrowing = np.zeros((count, 2)), np.zeros((count, 2))
         for j in range(count):
             low, high = common_interval(intervals[:, j])
             if not low < high:
                 continue
             self.centre[j] = 0.5 * (low + high)
-            own = around(intervals[:, j], self.centre[j])
-            self.extreme[j] = own[:, 0].max(), own[:, 1].min()
-            lost = self.extreme[j] - (own[coarse, 0].max(), own[coarse, 1].min())
+            ends = around(intervals[:, j], self.centre[j])
+            self.extreme[j] = ends[:, 0].max(), ends[:, 1].min()
+            # what the lattice takes away from that of every second point (step 2)
+            lost = self.extreme[j] - (ends[coarse, 0].max(), ends[coarse, 1].min())
             self.narrowing[j] = np.abs(lost)
         width = self.extreme[:, 1] - self.extreme[:, 0]
         self.narrowing = (
@@ -432,15 +441,17 @@ class Limits:
         intervals  (N, bands, GAPS, 2)  stable ones at the samples
         """
         for j in np.flatnonzero(~np.isnan(self.centre)):
-            own = around(intervals[:, j], self.centre[j])
-            if np.isnan(own).any():  # no stable interval holds the middle: nothing is left of this band
+            ends = around(intervals[:, j], self.centre[j])
+            if np.isnan(
+                ends
+            ).any():  # at a sample no stable interval holds the middle: nothing is left of this band
                 self.centre[j] = np.nan
                 continue
-            self.extreme[j] = max(self.extreme[j, 0], own[:, 0].max()), min(self.extreme[j, 1], own[:, 1].min())
+            self.extreme[j] = max(self.extreme[j, 0], ends[:, 0].max()), min(self.extreme[j, 1], ends[:, 1].min())
 
     def meet(self, intervals: Floats) -> bool:
-        """Move the limits that further samples have used up, and double what they are narrowed by; returns whether
-        there are any."""
+        """Move the limits of which further samples, `intervals` as for `tighten`, use up more than HALF of the
+        narrowing, and double that. Returns whether a limit moved, or a band lost its range."""
         centre, before = self.centre.copy(), self.extreme.copy()
         self.tighten(intervals)
         moved = np.abs(self.extreme - before) > HALF * self.narrowing
@@ -509,19 +520,19 @@ class Sampler:
     """Draws samples of a cell over some sectors: one, or all.
 
     sectors  of all directions
-    own      numbers of those that samples may have
+    allowed  numbers of those that samples may lie in
     random   generator
     """
 
     sectors: Sectors
-    own: tuple[int, ...]
+    allowed: tuple[int, ...]
     random: np.random.Generator
 
     @property
     def groups(self) -> int:
         """Number of groups: for each corner of the cell, and each face of the square or cube of directions."""
         d = self.sectors.dimensions
-        return d << d
+        return d << d  # d faces, 2^d corners
 
     def group(self, samples: CellSamples) -> Ints:
         """Group (n,) of each sample: the corner of the cell that is nearest, and the face of its direction."""
@@ -529,27 +540,28 @@ class Sampler:
         corner = (samples.posture > 0.5) @ (2 ** np.arange(d))
         return np.asarray(corner * d + samples.sector // self.sectors.parts ** (d - 1), dtype=np.int64)
 
-    def lattice(self, of_postures: int, of_directions: int) -> tuple[CellSamples, Flags]:
-        """Samples of a lattice of so many points along each axis of the cell, and of each sector; and which of
-        them belong to that of every second point."""
+    def lattice(self, postures_per_axis: int, directions_per_axis: int) -> tuple[CellSamples, Flags]:
+        """Samples (n,) of a lattice of so many points along each axis of the cell, and of each sector; and which
+        of them (n,) belong to the lattice of every second point."""
         d = self.sectors.dimensions
-        postures, directions = lattice(of_postures, d), lattice(of_directions, d - 1)
-        p, s, u = (
+        postures, directions = lattice(postures_per_axis, d), lattice(directions_per_axis, d - 1)
+        posture, sector, direction = (  # of each sample: rows of `postures` and `directions`, and its sector
             index.ravel()
             for index in np.meshgrid(
-                np.arange(len(postures)), np.array(self.own), np.arange(len(directions)), indexing="ij"
+                np.arange(len(postures)), np.array(self.allowed), np.arange(len(directions)), indexing="ij"
             )
         )
-        even = [
+        even = [  # of postures, of directions: whether all their places along the lines are even
             (np.round(points * (side - 1)).astype(int) % 2 == 0).all(axis=1)
-            for points, side in ((postures, of_postures), (directions, of_directions))
+            for points, side in ((postures, postures_per_axis), (directions, directions_per_axis))
         ]
-        return CellSamples(postures[p], s, directions[u]), even[0][p] & even[1][u]
+        coarse = even[0][posture] & even[1][direction]
+        return CellSamples(postures[posture], sector, directions[direction]), coarse
 
     def anywhere(self, count: int) -> CellSamples:
         """`count` random samples; the share BORDER of their coordinates lies on the border of the cell."""
         d = self.sectors.dimensions
-        sectors = np.array(self.own)[self.random.integers(len(self.own), size=count)]
+        sectors = np.array(self.allowed)[self.random.integers(len(self.allowed), size=count)]
         posture = self.random.random((count, d))
         posture = np.where(self.random.random((count, d)) < BORDER, np.round(posture), posture)
         return CellSamples(posture, sectors, self.random.random((count, d - 1)))
@@ -557,12 +569,12 @@ class Sampler:
     def beside(self, samples: CellSamples, size: float | Floats) -> CellSamples:
         """Random samples beside these, about `size` (n, 1) away, a share of the cell and of a face of directions.
 
-        Where all directions are asked for, a sample goes on from one sector to the next. A single sector ends at
-        its border.
+        Where samples may lie in all sectors, one goes on from a sector to the next. A single sector ends at its
+        border.
         """
         posture = samples.posture + size * self.random.standard_normal(samples.posture.shape)
         posture = np.clip(posture, 0.0, 1.0)
-        if len(self.own) < self.sectors.count or self.sectors.count == 1:
+        if len(self.allowed) < self.sectors.count or self.sectors.count == 1:
             direction = samples.direction + size * self.random.standard_normal(samples.direction.shape)
             return CellSamples(posture, samples.sector, np.clip(direction, 0.0, 1.0))
         along = self.along(samples)
@@ -571,8 +583,9 @@ class Sampler:
         return CellSamples(posture, *self.sectors.places(along))
 
     def around_each(self, samples: CellSamples, size: float, each: int) -> CellSamples:
-        """Samples beside each of these, `each` >= 2 times n: another posture; another direction; then both. Tight
-        ones often lie in a corner of their cell, which few steps in both keep."""
+        """Samples beside each of these n, as in `beside`: n that differ in posture only, n in direction only, and
+        n times the rest of `each` >= 2 in both. Tight ones often lie in a corner of their cell, which few steps in
+        both keep."""
         beside = [self.beside(samples, size) for _ in range(each)]
         beside[0] = CellSamples(beside[0].posture, samples.sector, samples.direction)
         beside[1] = CellSamples(samples.posture, beside[1].sector, beside[1].direction)

@@ -78,9 +78,10 @@ class LoopEdgeChords:
 
 
 def edges_of_points(point: OperatingPoint) -> LoopEdgeChords:
-    """The edges of the stable sets at all points, flat.
+    """The edges of the stable sets at all N points of `point`, in C order whatever its shape.
 
-    Points whose modes compiled code cannot treat, and charts in doubt, are charted alone.
+    A point whose modes compiled code cannot treat, or whose chart is in doubt there, is charted by itself in
+    Python; it is not `known` where that fails, too.
 
     Raises  what `OperatingPoint.loop` and `chart_at` raise
     """
@@ -99,7 +100,7 @@ def edges_of_points(point: OperatingPoint) -> LoopEdgeChords:
         known = np.ones(number, dtype=np.bool_)
         for n in np.flatnonzero(doubtful):
             try:
-                each[n] = _charted_alone(piece[n] if point.shape else piece)
+                each[n] = _chords_from_chart(piece[n] if point.shape else piece)
             except (ChartError, UnmovedError, np.linalg.LinAlgError):
                 known[n], each[n] = False, np.empty((0, 6))
         offsets = np.concatenate([[0], np.cumsum([len(one) for one in each])]).astype(np.int64)
@@ -107,11 +108,11 @@ def edges_of_points(point: OperatingPoint) -> LoopEdgeChords:
     return LoopEdgeChords.joined(parts)
 
 
-def _charted_alone(point: OperatingPoint) -> Floats:
-    """The chords of one point's edge, by its own chart. Raises ChartError."""
+def _chords_from_chart(point: OperatingPoint) -> Floats:
+    """The chords (m, 6) of one point's edge, taken from the rings of its stability chart. Raises ChartError."""
     chart = chart_at(point) if point.charted_by_response else stability_chart(point.loop, decay=False)
     each = []
-    for ring in chart.regions:
+    for ring in chart.regions:  # (w, 2) walls K, B
         size = np.ptp(ring, axis=0)
         # a chord along an axis is straight, above all the line of real roots at K = 0
         sag = np.where(np.abs(np.diff(ring, axis=0)) > STRAIGHT * size, RING_SAG * size, 0.0)
@@ -121,14 +122,14 @@ def _charted_alone(point: OperatingPoint) -> Floats:
 
 def _fill_all(loops: LoopTable, chords: Floats, counts: Ints, doubtful: Flags) -> None:
     """Fill in `chords`, `counts` and `doubtful` of all loops, see `_fill_several`, on several threads."""
-    own = local()
+    thread = local()  # each thread works in a memory of its own
 
-    def several(first: int, last: int) -> None:
-        if not hasattr(own, "memory"):
-            own.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
-        _fill_several(loops, own.memory, chords, counts, doubtful, first, last)
+    def fill_chunk(first: int, last: int) -> None:
+        if not hasattr(thread, "memory"):
+            thread.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
+        _fill_several(loops, thread.memory, chords, counts, doubtful, first, last)
 
-    in_chunks(several, len(counts))
+    in_chunks(fill_chunk, len(counts))
 
 
 @compiled
@@ -141,13 +142,18 @@ def _fill_several(
     first: int,
     last: int,
 ) -> None:
-    """Chords (N, MOST_CHORDS, 6) of loops first to last - 1, their numbers (N,), and which are in doubt (N,)."""
-    memory.circle.sizes[COMPUTER] = -1
+    """Trace the edges of loops first to last - 1 of N and write their chords.
+
+    chords    (N, MOST_CHORDS, 6)  out: of each loop the first counts[i] rows, see `LoopEdgeChords`
+    counts    (N,)  out: number of chords of each loop
+    doubtful  (N,)  out: whether a loop has to be charted in Python, and has no chords here
+    """
+    memory.circle.sizes[COMPUTER] = -1  # what `memory` holds of a loop before is not used
     for i in range(first, last):
         doubtful[i], counts[i] = True, 0
         if loops.section_count[i] == 0 or degree_of(loops, i) > MOST_DEGREE:
             continue
-        fill_loop(loops, i, 1.0, memory)
+        fill_loop(loops, i, 1.0, memory)  # on the unit circle |z| = 1
         if read_edge(memory) == DOUBTFUL:
             continue
         count = _fill_chords(memory, chords[i])
@@ -157,11 +163,14 @@ def _fill_several(
 
 @compiled_lean
 def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
-    """Write the chords of the edge's rings to `out`; their number, -1 for too many, or one that is not finite."""
+    """Write the chords of the edge whose arcs stand in `memory` to `out` (m, 6).
+
+    Returns their number; -1 where they are more than m, or one is not finite.
+    """
     arcs, n = memory.arcs, 0
     for k in range(memory.counts[ARCS]):
         following = arcs.next_arc[k]
-        if following < 0:
+        if following < 0:  # no more than a corner
             continue
         if arcs.kind[k] == PAIR:
             n = _add_curve(memory, k, out, n)
@@ -170,9 +179,10 @@ def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
         if n < 0:
             return -1
         # where rounding blurs a corner it is two walls, joined by a chord
-        x, y, u, v = arcs.last[k, 0], arcs.last[k, 1], arcs.first[following, 0], arcs.first[following, 1]
-        if x != u or y != v:
-            n = _add_chord(out, n, x, y, u, v, 0.0, 0.0)
+        K_end, B_end = arcs.last[k, 0], arcs.last[k, 1]
+        K_next, B_next = arcs.first[following, 0], arcs.first[following, 1]
+        if K_end != K_next or B_end != B_next:
+            n = _add_chord(out, n, K_end, B_end, K_next, B_next, 0.0, 0.0)
             if n < 0:
                 return -1
     return n
@@ -180,47 +190,55 @@ def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
 
 @compiled_lean
 def _add_curve(memory: EdgeMemory, k: int, out: Floats, n: int) -> int:
-    """Write PIECES chords for each interval between the nodes of arc k; the number so far, -1 as `_add_chord`.
+    """Write PIECES chords behind the first n of `out` for each interval between neighbouring nodes of arc k.
 
-    The interval is cut at equal steps of the angle, with t = tan(theta/2); its second differences tell how far the
-    curve lies beside the chords.
+    The interval is cut at equal steps of the angle theta of the root, with t = tan(theta/2); the largest second
+    difference of the walls at the cuts tells how far the curve lies beside the chords.
+
+    Returns the number of chords so far; -1 as `_add_chord`.
     """
-    circle, nodes = memory.circle, memory.picked
+    circle, nodes = memory.circle, memory.picked  # rows of nodes: t, K and B
     count = fill_nodes(memory, k)
     for i in range(1, count):
         start, end = 2.0 * np.arctan(nodes[0, i - 1]), 2.0 * np.arctan(nodes[0, i])
-        x0, y0 = nodes[1, i - 1], nodes[2, i - 1]
-        x, y, before_x, before_y = x0, y0, 0.0, 0.0
+        K, B = nodes[1, i - 1], nodes[2, i - 1]
+        step_K = step_B = 0.0  # of the chord before
         sag_K = sag_B = 0.0
         begin = n
         for j in range(1, PIECES + 1):
             if j < PIECES:
-                u, v = wall_on_circle(circle, np.tan(0.5 * (start + (end - start) * j / PIECES)))
+                K_next, B_next = wall_on_circle(circle, np.tan(0.5 * (start + (end - start) * j / PIECES)))
             else:
-                u, v = nodes[1, i], nodes[2, i]
+                K_next, B_next = nodes[1, i], nodes[2, i]
             if j > 1:
-                sag_K = max(sag_K, abs(u - x - before_x))
-                sag_B = max(sag_B, abs(v - y - before_y))
-            before_x, before_y = u - x, v - y
-            n = _add_chord(out, n, x, y, u, v, 0.0, 0.0)
+                sag_K = max(sag_K, abs(K_next - K - step_K))
+                sag_B = max(sag_B, abs(B_next - B - step_B))
+            step_K, step_B = K_next - K, B_next - B
+            n = _add_chord(out, n, K, B, K_next, B_next, 0.0, 0.0)
             if n < 0:
                 return -1
-            x, y = u, v
+            K, B = K_next, B_next
         for j in range(begin, n):
             out[j, SAG_K], out[j, SAG_B] = SAG * sag_K, SAG * sag_B
     return n
 
 
 @compiled_lean
-def _add_chord(out: Floats, n: int, x: float, y: float, u: float, v: float, sag_K: float, sag_B: float) -> int:
-    """Write chord n; the number of chords, -1 where memory is full or an end is not finite."""
-    if n >= len(out) or not np.isfinite(x + y + u + v):
+def _add_chord(
+    out: Floats, n: int, K: float, B: float, K_next: float, B_next: float, sag_K: float, sag_B: float
+) -> int:
+    """Write the chord from wall K, B to the next to row n of `out`.
+
+    Returns n + 1, the number of chords now; -1 where `out` is full or an end is not finite.
+    """
+    if n >= len(out) or not np.isfinite(K + B + K_next + B_next):
         return -1
-    out[n, K0], out[n, B0], out[n, K1], out[n, B1], out[n, SAG_K], out[n, SAG_B] = x, y, u, v, sag_K, sag_B
+    out[n, K0], out[n, B0], out[n, K1], out[n, B1] = K, B, K_next, B_next
+    out[n, SAG_K], out[n, SAG_B] = sag_K, sag_B
     return n + 1
 
 
-GAPS: Final = 4  # stable intervals kept of a band, the longest
+GAPS: Final = 4  # stable intervals of damping kept of a band: the longest
 # Where in the band the ray runs: at no special place, so that it passes no corner; both have to agree.
 PROBES: Final = (0.4871, 0.3413)
 
@@ -238,14 +256,20 @@ def stable_damping_intervals(edges: LoopEdgeChords, bands: Floats) -> Floats:
     return out
 
 
-# Fill in `out`, what `stable_damping_intervals` returns; `room` (k, 2) is for the intervals that chords occupy.
 @compiled
 def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, out: Floats) -> None:
+    """Fill in `out` (N, b, GAPS, 2), what `stable_damping_intervals` returns, from `chords` and `offsets` of N
+    edges.
+
+    bands  (b, 2)  lowest and highest stiffness of each [N/m]
+    room   (k, 2)  memory for the intervals of damping that the chords of one loop occupy
+    """
     for i in range(len(offsets) - 1):
         first, last = offsets[i], offsets[i + 1]
         for j in range(len(bands)):
             low, high = bands[j, 0], bands[j, 1]
-            n = _obstacles(chords, first, last, low, high, room)
+            n = _occupied_intervals(chords, first, last, low, high, room)
+            # no edge lies between the highest end so far and the next lower end: one wall there tells of that gap
             top, count = -np.inf, 0
             for k in range(n):
                 if (
@@ -258,39 +282,46 @@ def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, 
 
 
 @compiled_lean
-def _obstacles(chords: Floats, first: int, last: int, low: float, high: float, room: Floats) -> int:
-    """Write to `room` the intervals of damping that chords in a band occupy, by ascending lower end; how many."""
+def _occupied_intervals(chords: Floats, first: int, last: int, low: float, high: float, room: Floats) -> int:
+    """Write to `room` (k, 2) the lowest and highest damping of chords first to last - 1 within a band of
+    stiffnesses from low to high, widened by their sags, by ascending lower end. Returns how many there are."""
     n = 0
     for c in range(first, last):
-        x, y, u, v = chords[c, K0], chords[c, B0], chords[c, K1], chords[c, B1]
+        K, B, K_end, B_end = chords[c, K0], chords[c, B0], chords[c, K1], chords[c, B1]
         below, above = low - chords[c, SAG_K], high + chords[c, SAG_K]
-        if max(x, u) < below or min(x, u) > above:
+        if max(K, K_end) < below or min(K, K_end) > above:
             continue
-        if x > u:
-            x, y, u, v = u, v, x, y
-        if x < below:
-            y += (below - x) / (u - x) * (v - y)
-            x = below
-        if u > above:
-            v = y + (above - x) / (u - x) * (v - y)
-        a, b = min(y, v) - chords[c, SAG_B], max(y, v) + chords[c, SAG_B]
-        i = n
-        while i > 0 and room[i - 1, 0] > a:
+        # cut to the band, from the softer end to the stiffer
+        if K_end < K:
+            K, B, K_end, B_end = K_end, B_end, K, B
+        if below > K:
+            B += (below - K) / (K_end - K) * (B_end - B)
+            K = below
+        if above < K_end:
+            B_end = B + (above - K) / (K_end - K) * (B_end - B)
+        lower, upper = min(B, B_end) - chords[c, SAG_B], max(B, B_end) + chords[c, SAG_B]
+        i = n  # sorted in
+        while i > 0 and room[i - 1, 0] > lower:
             room[i, 0], room[i, 1] = room[i - 1, 0], room[i - 1, 1]
             i -= 1
-        room[i, 0], room[i, 1] = a, b
+        room[i, 0], room[i, 1] = lower, upper
         n += 1
     return n
 
 
 @compiled_lean
 def _is_inside(chords: Floats, first: int, last: int, low: float, high: float, B: float) -> bool:
-    """Whether walls of this damping in the band are stable: two rays towards larger B, which must agree."""
+    """Whether walls of damping B in the band from low to high are stable, where no edge lies at B.
+
+    From two walls of the band a ray goes towards larger B: both must cross chords first to last - 1, the edge of
+    one loop, an odd number of times.
+    """
     for share in PROBES:
         K, odd = low + share * (high - low), False
         for c in range(first, last):
-            x, u = chords[c, K0], chords[c, K1]
-            if (x > K) != (u > K) and chords[c, B0] + (K - x) / (u - x) * (chords[c, B1] - chords[c, B0]) > B:
+            K_start, K_end, B_start, B_end = chords[c, K0], chords[c, K1], chords[c, B0], chords[c, B1]
+            crosses = (K_start > K) != (K_end > K)
+            if crosses and B_start + (K - K_start) / (K_end - K_start) * (B_end - B_start) > B:
                 odd = not odd
         if not odd:
             return False
@@ -299,7 +330,8 @@ def _is_inside(chords: Floats, first: int, last: int, low: float, high: float, B
 
 @compiled_lean
 def _keep_longest(out: Floats, count: int, low: float, high: float) -> int:
-    """Add an interval behind the others, without the shortest where they are too many; their number."""
+    """Add the interval from low to high behind the first `count` of `out` (GAPS, 2); where `out` is full, the
+    shortest of all is left out. Returns the number of intervals now."""
     if count < GAPS:
         out[count, 0], out[count, 1] = low, high
         return count + 1
@@ -315,7 +347,8 @@ def _keep_longest(out: Floats, count: int, low: float, high: float) -> int:
 
 
 def common_interval(intervals: Floats) -> tuple[float, float]:
-    """The longest interval (low, high) that lies in one of each loop's, (nan, nan) where there is none.
+    """The longest interval, lowest and highest damping [N s/m], that lies within an interval of every loop; (nan,
+    nan) where there is none.
 
     intervals  (N, GAPS, 2) of each loop, nan behind the last
     """
@@ -326,20 +359,24 @@ def common_interval(intervals: Floats) -> tuple[float, float]:
 
 @compiled
 def _common(intervals: Floats, room: Floats) -> tuple[float, float]:
-    """The longest common interval: what is left is cut by the intervals of one loop after the other."""
+    """Lowest and highest damping of the longest common interval, see `common_interval`; nan where there is none.
+
+    Intervals common to the loops so far, at first all dampings, are cut by those of one loop after the other.
+    room  (2, k, 2)  memory: the common intervals before and after a loop, which change places from loop to loop
+    """
     count, now = 1, 0
     room[0, 0, 0], room[0, 0, 1] = -np.inf, np.inf
     for i in range(len(intervals)):
-        left = 0
+        kept = 0
         for k in range(count):
-            for g in range(GAPS):
-                if not intervals[i, g, 0] < intervals[i, g, 1]:  # nan, of which max and min say nothing
+            for gap in range(GAPS):
+                if not intervals[i, gap, 0] < intervals[i, gap, 1]:  # nan, of which max and min say nothing
                     break
-                low, high = max(room[now, k, 0], intervals[i, g, 0]), min(room[now, k, 1], intervals[i, g, 1])
-                if low < high and left < room.shape[1]:
-                    room[1 - now, left, 0], room[1 - now, left, 1] = low, high
-                    left += 1
-        now, count = 1 - now, left
+                low, high = max(room[now, k, 0], intervals[i, gap, 0]), min(room[now, k, 1], intervals[i, gap, 1])
+                if low < high and kept < room.shape[1]:
+                    room[1 - now, kept, 0], room[1 - now, kept, 1] = low, high
+                    kept += 1
+        now, count = 1 - now, kept
     best, low, high = 0.0, np.nan, np.nan
     for k in range(count):
         if room[now, k, 1] - room[now, k, 0] > best:

@@ -55,7 +55,7 @@ class CellGrid:
         return np.asarray((self.high - self.low) / np.array(self.counts, dtype=np.float64))
 
     def lines(self, axis: int) -> Floats:
-        """Coordinates [m] of the cells' borders along an axis, one more than there are cells."""
+        """Coordinates (count + 1,) [m] of the borders of the cells along an axis, given by its index."""
         return np.asarray(self.low[axis] + self.step[axis] * np.arange(self.counts[axis] + 1))
 
     def index(self, cell: int) -> tuple[int, ...]:
@@ -73,8 +73,9 @@ class CellGrid:
         return np.asarray(self.through + coordinates @ self.axes)
 
     def cell_at(self, position: Sequence[float]) -> int | None:
-        """The cell that holds a position (d,) [m], by the exported program's rule; None outside the grid."""
-        cell, stride = 0, 1
+        """Number of the cell that holds a position (d,) [m] along the axes, computed as the exported program does;
+        None outside the grid. A position on the highest border belongs to the last cell."""
+        cell, stride = 0, 1  # the first axis goes round fastest
         for axis, count in enumerate(self.counts):
             place = (float(position[axis]) - float(self.low[axis])) * (1.0 / float(self.step[axis]))
             if not 0.0 <= place <= count:
@@ -110,30 +111,30 @@ def cells_of(
         )
     _check_counts(cells, 2 if flat else 3)
     if flat:
-        _check_plane_alone(ranges)
+        _check_no_range_of_z(ranges)
         lines = None if cells is None else (cells[0] + 1, cells[1] + 1)
         plane = plane_of(device, None, None, ranges[0], ranges[1], lines or (2, 2), assembly)
         low, high = np.array([plane.x[0], plane.y[0]]), np.array([plane.x[-1], plane.y[-1]])
         axes, through = np.stack([plane.first, plane.second]), plane.through
         names: tuple[str, ...] = plane.names
     else:
-        low, high = _ends_in_space(mechanism, reach, ranges)
+        low, high = _lowest_and_highest_in_space(mechanism, reach, ranges)
         axes, through, names = np.eye(3), np.zeros(3), ("x", "y", "z")
-    counts = tuple(cells) if cells is not None else _counts(high - low)
+    counts = tuple(cells) if cells is not None else _default_counts(high - low)
     if np.prod(counts, dtype=float) > MOST:
         raise WorkspaceError(f"a table has at most {MOST:.0e} cells, got {' x '.join(map(str, counts))}")
     return CellGrid(axes, through, low, high, counts, tuple(names))
 
 
 def _cell_everywhere(ranges: Sequence[Sequence[float] | None], cells: Sequence[int] | None) -> CellGrid:
-    """Return the one cell of a device without a mechanism. Raises WorkspaceError for ranges or numbers of cells,
-    which such a device has not."""
+    """Return the grid of one cell that a device without a mechanism has. Raises WorkspaceError for ranges or
+    numbers of cells, which such a device has not."""
     if cells is not None or any(one is not None for one in ranges):
         raise WorkspaceError(
             "the device has no [mechanism], and so no workspace; its walls are the same everywhere"
         )
-    none = np.empty(0)
-    return CellGrid(np.empty((0, 3)), np.zeros(3), none, none, (), ())
+    no_numbers = np.empty(0)
+    return CellGrid(np.empty((0, 3)), np.zeros(3), no_numbers, no_numbers, (), ())
 
 
 def _count_of_drives(mechanism: Mechanism) -> int:
@@ -152,7 +153,7 @@ def _count_of_drives(mechanism: Mechanism) -> int:
     return drives
 
 
-def _ends_in_space(
+def _lowest_and_highest_in_space(
     mechanism: Mechanism, reach: ReachableSet, ranges: Sequence[Sequence[float] | None]
 ) -> tuple[Floats, Floats]:
     """Return the lowest and the highest coordinates (3,) [m] of the ranges; of one that is None those of the
@@ -183,7 +184,7 @@ def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:
         raise WorkspaceError(f"a table needs at least 1 cell along each axis, got {','.join(map(str, cells))}")
 
 
-def _check_plane_alone(ranges: Sequence[Sequence[float] | None]) -> None:
+def _check_no_range_of_z(ranges: Sequence[Sequence[float] | None]) -> None:
     """Raise WorkspaceError for a range along z, which a plane has not."""
     if len(ranges) > 2 and ranges[2] is not None:
         raise WorkspaceError(
@@ -191,8 +192,9 @@ def _check_plane_alone(ranges: Sequence[Sequence[float] | None]) -> None:
         )
 
 
-def _counts(lengths: Floats) -> tuple[int, ...]:
-    """Cells along axes of these lengths (d,) [m]: LONG_SIDE along the longest, of about that size along others."""
+def _default_counts(lengths: Floats) -> tuple[int, ...]:
+    """Numbers of cells along axes of these lengths (d,) [m]: LONG_SIDE along the longest, and along the others so
+    many that cells are about as long as wide."""
     long = LONG_SIDE[len(lengths)]
     return tuple(max(1, round(long * float(length / lengths.max()))) for length in lengths)
 
@@ -223,9 +225,9 @@ class Sectors:
         """Vectors (n, d), not of unit length, in a sector a little larger than it is, at shares (n, d - 1) of its
         size from 0 to 1."""
         d = self.dimensions
-        face, place = divmod(sector, self.parts ** (d - 1))
+        face, place = divmod(sector, self.parts ** (d - 1))  # place: of the sector on its face
         out = np.ones((len(shares), d))
-        for k in range(1, d):
+        for k in range(1, d):  # the components that follow that of the face, cyclically
             place, piece = divmod(place, self.parts)
             wide = (1.0 + 2.0 * OVERLAP) * shares[:, k - 1] - OVERLAP
             out[:, (face + k) % d] = 2.0 * (piece + wide) / self.parts - 1.0
@@ -252,8 +254,8 @@ class Sectors:
         return face * stride + place, shares
 
     def sector_of(self, direction: Sequence[float]) -> int | None:
-        """The sector of a direction (d,), by the exported program's rule; None for one that is zero, or has a
-        component that is no number or beyond LONGEST."""
+        """The sector of a direction (d,), computed as the exported program does; None for one that is zero, or has
+        a component that is no number or beyond LONGEST."""
         d = self.dimensions
         face, longest = 0, 0.0
         for k in range(d):

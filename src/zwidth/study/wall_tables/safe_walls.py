@@ -127,7 +127,7 @@ def safe_walls_job(
             f"the table takes {size} bytes, more than the {size_limit} of its limit",
             Advice("take fewer with {}, or fewer levels", "cells"),
         )
-    _check_point(question)
+    _check_reference_points(question)
     return SafeWallsJob(question)
 
 
@@ -160,7 +160,10 @@ def compute_table(
     cluster: str | None = None,
     time_limit: float | None = None,
 ) -> SafeWalls:
-    """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
+    """Compute the cells of a job and make their table. Raises what `safe_walls` does.
+
+    span, store, progress, workers  as for `safe_walls`;   cluster, time_limit  as for `executor.run_job`
+    """
     check_arguments(EXPORT, span=span)
     cells = run_job(
         job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit
@@ -180,21 +183,22 @@ def _check_kinds(hands: object, cells: object, ranges: Sequence[object]) -> None
         raise wrong_type("hands", "a list of operators", hands, f"write [{hands!r}]")
     if hands is not None and not isinstance(hands, Sequence):
         raise wrong_type("hands", "a list of operators", hands)
-    if cells is not None and not _all(cells, Integral):
+    if cells is not None and not _are_numbers(cells, Integral):
         raise wrong_type("cells", "whole numbers such as (20, 10)", cells)
     for name, given in zip("xyz", ranges, strict=True):
-        if given is not None and not (_all(given, Real) and len(given) == 2):  # type: ignore[arg-type]
+        if given is not None and not (_are_numbers(given, Real) and len(given) == 2):  # type: ignore[arg-type]
             raise wrong_type(name, "two numbers such as (-0.1, 0.1)", given)
 
 
-def _all(values: Any, kind: type[Any]) -> bool:
-    """Whether these are a sequence, or an array, of numbers of this kind."""
-    whole = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
-    return whole and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
+def _are_numbers(values: Any, kind: type[Any]) -> bool:
+    """Whether `values` is a sequence, or an array, of numbers of a kind: Integral or Real, but not bool."""
+    is_sequence = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
+    return is_sequence and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
 
 
-def _check_point(question: CellQuestion) -> None:
-    """Raise the error about the device, its assembly or its model, before it becomes the status of all cells."""
+def _check_reference_points(question: CellQuestion) -> None:
+    """Raise what `Device.at` and `OperatingPoint.loop` raise at the reference posture, with each of the hands: an
+    error about the device, its assembly or its model would else become the status of all cells."""
     from zwidth.errors import PostureError
 
     for device in question.devices:
@@ -205,7 +209,7 @@ def _check_point(question: CellQuestion) -> None:
         _ = point.loop
 
 
-METHOD: Final = 3  # changes with the way in which cells are searched, so that no table is made of two
+METHOD: Final = 3  # a number for the way in which cells are searched, so that no table is made in two ways
 
 
 @dataclass(frozen=True, repr=False)
@@ -251,7 +255,8 @@ class SafeWallsJob:
         )
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Cells first to last - 1, each by itself. Raises what `OperatingPoint.loop` raises."""
+        """Compute cells first to last - 1, each by itself; of one without safe walls all columns are nan, and have
+        its status. Raises what `OperatingPoint.loop` raises."""
         columns = len(self.measures)
         threads = numba.get_num_threads()
         numba.set_num_threads(1)  # kernels take a millisecond here, and handing out their chunks would take longer
@@ -261,7 +266,7 @@ class SafeWallsJob:
             numba.set_num_threads(threads)
         values = np.full((last - first, columns), np.nan)
         status = np.zeros((last - first, columns), dtype=np.uint8)
-        notes: dict[tuple[int, str], tuple[int, int]] = {}
+        notes: dict[tuple[int, str], tuple[int, int]] = {}  # status and reason -> number of cells, first of them
         for n, cell in enumerate(cells):
             status[n] = cell.status
             if cell.status == OK:
@@ -273,5 +278,5 @@ class SafeWallsJob:
                 key = cell.status, cell.reason or f"a posture in the cell is {STATUS[cell.status]}"
                 count, where = notes.get(key, (0, first + n))
                 notes[key] = count + 1, where
-        own = tuple(Note(*key, count, (where,)) for key, (count, where) in notes.items())
-        return CellValues(values, status, (own, *((),) * (columns - 1)))
+        listed = tuple(Note(*key, count, (where,)) for key, (count, where) in notes.items())
+        return CellValues(values, status, (listed, *((),) * (columns - 1)))  # once, with the first column

@@ -90,11 +90,12 @@ class SafeWalls(Result):
     # --- as the exported program answers ----------------------------------------------------------------
 
     def at(self, position: ArrayLike = ()) -> tuple[int, Rectangle]:
-        """The rectangle of safe walls at a handle position: 0 and that of the cell, or 1 and `outside`.
+        """The rectangle of safe walls at a handle position: 0 (INSIDE) and the rectangle of its cell; 1 (OUTSIDE)
+        and `outside` where no cell with walls holds the position.
 
         position  (d,) coordinates along the grid's axes [m]; of no account for a device without a mechanism
         """
-        cell = self._cell(position)
+        cell = self._cell_with_walls(position)
         return (OUTSIDE, self.outside) if cell is None else (INSIDE, self.rectangle(cell))
 
     def damping_at(
@@ -102,11 +103,12 @@ class SafeWalls(Result):
     ) -> tuple[int, float, float]:
         """The range of damping that is safe with a stiffness along a direction, and along its opposite.
 
+        position   as for `at`;   stiffness  [N/m]
         direction  (d,) of any length; None, zero or not finite: every direction
-        Returns    0, lowest, highest; 1 outside the table, with the range of `outside` where the stiffness is no
-                   larger than its; 2 where no damping is safe. Lowest above highest: no range
+        Returns    0, lowest and highest [N s/m]; 1 outside the table, with the range of `outside` where the
+                   stiffness is no larger than its; 2 where no damping is safe. Lowest above highest: no range
         """
-        cell, K = self._cell(position), float(stiffness)
+        cell, K = self._cell_with_walls(position), float(stiffness)
         if cell is None:
             inside = 0.0 <= K <= self.outside.stiffness
             return OUTSIDE, *((self.outside.low, self.outside.high) if inside else NONE)
@@ -122,18 +124,21 @@ class SafeWalls(Result):
         return NO_RANGE, *NONE
 
     def stiffness_of_level(self, cell: int, slot: int, level: int) -> float:
-        """Highest stiffness of the band below a level, 1 to `levels` [N/m]."""
+        """Highest stiffness [N/m] of band number `level`, from 1 to `levels`, of a table of a cell (slot as in
+        `top`)."""
         return float(self.top[cell, slot]) * float(level) / float(self.levels)
 
     def rectangle(self, cell: int) -> Rectangle:
-        """The rectangle of a cell that has one."""
+        """The rectangle of all directions of a cell that has one: the `level` lowest bands, with the damping that
+        is safe in all of them."""
         level = int(self.level[cell])
         part = self.ranges[cell, EVERYWHERE, :level]
         stiffness = self.stiffness_of_level(cell, EVERYWHERE, level)
         return Rectangle(stiffness, float(part[:, 0].max()), float(part[:, 1].min()))
 
-    def _cell(self, position: ArrayLike) -> int | None:
-        """The cell of a position, if it has walls."""
+    def _cell_with_walls(self, position: ArrayLike) -> int | None:
+        """Number of the cell that holds a position (d,) [m]; None outside the grid, and where it has no
+        rectangle."""
         cell = 0 if not self.grid.dimensions else self.grid.cell_at(np.asarray(position, dtype=float).tolist())
         return None if cell is None or self.level[cell] == 0 else cell
 
@@ -180,7 +185,7 @@ class SafeWalls(Result):
 
         `sector` counts from 1, 0 is every direction; coordinates are those of the cell's middle.
         """
-        counts = np.where(self.level > 0, self.question.slots * self.levels, 1)
+        counts = np.where(self.level > 0, self.question.slots * self.levels, 1)  # rows of each cell
         cell = np.repeat(np.arange(self.grid.count), counts)
         within = np.arange(len(cell)) - np.repeat(np.cumsum(counts) - counts, counts)
         slot, band = np.divmod(within, self.levels)
@@ -262,7 +267,7 @@ def table_size(question: CellQuestion) -> int:
 def table_of_cells(
     device: Device, hands: Sequence[str], question: CellQuestion, cells: Cells, span: float | None
 ) -> SafeWalls:
-    """The table from the values of its cells.
+    """The table from the values of its cells, rounded to 32 bits; a cell without a rectangle becomes NO_VALUE.
 
     cells  as `safe_walls.SafeWallsJob` computes them
     span   as in `SafeWalls`
@@ -275,13 +280,14 @@ def table_of_cells(
         [rounded(values[:, :, 1 : 1 + levels], np.inf), rounded(values[:, :, 1 + levels :], -np.inf)], axis=-1
     )
     ranges[ranges[..., 0] > ranges[..., 1]] = NONE
-    level = np.array([_level(top[c, 0], ranges[c, 0], span) if status[c] == OK else 0 for c in range(count)])
-    none = (status == OK) & (level == 0)
-    status[none] = NO_VALUE
-    reasons = [f"{_cells(note.count)} {STATUS[note.status]}: {note.reason}" for note in cells.notes[0]]
-    if none.any():
+    level = np.array([_levels_of_rectangle(ranges[c, 0], span) if status[c] == OK else 0 for c in range(count)])
+    without_rectangle = (status == OK) & (level == 0)
+    status[without_rectangle] = NO_VALUE
+    reasons = [f"{_cells_in_words(note.count)} {STATUS[note.status]}: {note.reason}" for note in cells.notes[0]]
+    if without_rectangle.any():
         wide = "" if span is None else f" of {span:g} N s/m or more"
-        reasons.append(f"{_cells(int(none.sum()))} {STATUS[NO_VALUE]}: no range of damping{wide} is safe")
+        cells_without = _cells_in_words(int(without_rectangle.sum()))
+        reasons.append(f"{cells_without} {STATUS[NO_VALUE]}: no range of damping{wide} is safe")
     good = level > 0
     outside = _common_rectangle(top[good, 0], ranges[good, 0], level[good], span)
     return SafeWalls(
@@ -299,7 +305,7 @@ def table_of_cells(
 
 
 def rounded(values: Floats, towards: float) -> Floats:
-    """The values as numbers of 32 bits, each rounded towards inf or -inf.
+    """The values (...) as numbers of 32 bits, each rounded towards inf or -inf.
 
     >>> rounded(np.array([0.1]), np.inf) >= 0.1, rounded(np.array([0.1]), -np.inf) <= 0.1
     (array([ True]), array([ True]))
@@ -309,11 +315,11 @@ def rounded(values: Floats, towards: float) -> Floats:
     return np.where(beyond, np.nextafter(near, np.float32(towards)), near).astype(np.float64)
 
 
-def _level(top: float, ranges: Floats, span: float | None) -> int:
-    """How many bands the rectangle takes: with a span the most whose common range is as wide, else those whose
-    rectangle has the largest area with B >= 0; 0 where there are none.
+def _levels_of_rectangle(ranges: Floats, span: float | None) -> int:
+    """How many bands, from the lowest, the rectangle takes: with a span the most whose common range of damping is
+    as wide, else those whose rectangle has the largest area with B >= 0; 0 where there are none.
 
-    ranges  (levels, 2)  of damping [N s/m]
+    ranges  (levels, 2)  of damping [N s/m] in each band
     """
     low, high = np.maximum.accumulate(ranges[:, 0]), np.minimum.accumulate(ranges[:, 1])
     with_range = np.cumprod(ranges[:, 0] <= ranges[:, 1]).astype(bool) & (low < high)
@@ -322,6 +328,7 @@ def _level(top: float, ranges: Floats, span: float | None) -> int:
     if span is not None:
         wide = np.flatnonzero(with_range & (high - low >= span))
         return int(wide[-1]) + 1 if len(wide) else 0
+    # in bands times N s/m: all are equally high
     area = np.where(with_range, np.arange(1, len(ranges) + 1) * np.maximum(high - np.maximum(low, 0.0), 0.0), -1.0)
     return int(area.argmax()) + 1
 
@@ -332,26 +339,27 @@ def _common_rectangle(top: Floats, ranges: Floats, level: Ints, span: float | No
 
     top     (cells,)  largest stiffness of each [N/m]
     ranges  (cells, levels, 2)  of damping in each band [N s/m]
-    level   (cells,)  of the cells' rectangles
+    level   (cells,)  how many bands each cell's rectangle has
     """
     if not len(top):
         return Rectangle(0.0, 0.0, 0.0)
     levels = ranges.shape[1]
-    least = float((top * level).min()) / levels
+    least = float((top * level).min()) / levels  # stiffness of the softest rectangle [N/m]
     common = np.empty((levels, 2))
     for j in range(levels):
-        # the band of each cell that holds this stiffness, and all below
-        last = np.clip(np.ceil(least * (j + 1) / top), 1, levels).astype(int)
-        parts = [ranges[c, : last[c]] for c in range(len(top))]
+        # how many bands of each cell hold the stiffnesses up to the end of band j
+        needed = np.clip(np.ceil(least * (j + 1) / top), 1, levels).astype(int)
+        parts = [ranges[c, : needed[c]] for c in range(len(top))]
         empty = any((part[:, 0] > part[:, 1]).any() for part in parts)
         limits = max(part[:, 0].max() for part in parts), min(part[:, 1].min() for part in parts)
         common[j] = NONE if empty or limits[0] > limits[1] else limits
-    taken = _level(least, common, span)
+    taken = _levels_of_rectangle(common, span)
     if taken == 0:
         return Rectangle(0.0, 0.0, 0.0)
     stiffness = float(rounded(np.array(least * taken / levels), -np.inf))
     return Rectangle(stiffness, float(common[:taken, 0].max()), float(common[:taken, 1].min()))
 
 
-def _cells(count: int) -> str:
+def _cells_in_words(count: int) -> str:
+    """A number of cells in words: "1 cell", "2 cells"."""
     return "1 cell" if count == 1 else f"{count} cells"

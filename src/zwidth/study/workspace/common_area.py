@@ -131,6 +131,7 @@ def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> Com
     reachable_area = float(reachable_shape.area)
 
     def region(shape: Any) -> PlaneArea:
+        """A shapely geometry with its area and its share of what is reached."""
         area = float(shape.area)
         return PlaneArea(shape, area, area / reachable_area if reachable_area > 0.0 else np.nan)
 
@@ -172,9 +173,9 @@ def nonnegative_region(x: Floats, y: Floats, margin: Floats) -> Any:
 
     finite = np.abs(margin[np.isfinite(margin)])
     most = 2.0 * float(finite.max(initial=0.0)) or 1.0
-    z = np.ma.masked_invalid(np.clip(margin, -most, most))  # keeps nan
+    clipped = np.ma.masked_invalid(np.clip(margin, -most, most))  # masks nan, which clip keeps
     generator = contourpy.contour_generator(
-        x, y, z, name="serial", corner_mask=True, fill_type=contourpy.FillType.OuterOffset
+        x, y, clipped, name="serial", corner_mask=True, fill_type=contourpy.FillType.OuterOffset
     )
     lines: Any = generator.filled(-ROUNDING * most, 2.0 * most)
     rings, offsets = lines

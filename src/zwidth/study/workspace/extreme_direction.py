@@ -98,7 +98,7 @@ class _Goal:
     """The extreme to look for, and the points at which there is none.
 
     sign    1: the lowest value, -1: the highest
-    strict  a point with one direction without a value has no value
+    strict  True: a point has no value where it has none along one direction; False: along all
     """
 
     def __init__(self, sign: float, strict: bool) -> None:
@@ -106,7 +106,7 @@ class _Goal:
         self.points_by_reason: dict[tuple[int, str], list[int]] = {}
 
     def cost(self, values: Floats) -> Floats:
-        """The function to minimise; inf where there is no value."""
+        """The function to minimise at values (...) of the measure, nan where there is none; inf there."""
         return np.where(np.isnan(values), np.inf, self.sign * values)
 
     def status(self, values: MeasureValues, status: NDArray[np.uint8], which: Ints) -> NDArray[np.uint8]:
@@ -116,19 +116,19 @@ class _Goal:
         status  (s, n)  its status at s directions of n points
         which   (n,)    indices of the points
         """
-        none = status != OK
-        if not none.any():
+        without = status != OK
+        if not without.any():
             return np.full(len(which), OK, dtype=np.uint8)
         reasons = {note.status: note.reason for note in reversed(values.notes)}
-        everywhere = none.all(axis=0)
+        everywhere = without.all(axis=0)  # (n,), as `kind`
         # of several kinds the least: a point has no value rather than an undecided one
-        kind = np.where(none, status, MISSING).min(axis=0)
+        kind = np.where(without, status, MISSING).min(axis=0)
         some = "along some directions: " if self.strict else "along some directions, which are left out: "
-        for label, here in (("", everywhere), (some, none.any(axis=0) & ~everywhere)):
+        for label, here in (("", everywhere), (some, without.any(axis=0) & ~everywhere)):
             for k in np.unique(kind[here]):
                 reason = label + reasons.get(int(k), "has no value here")
                 self.points_by_reason.setdefault((int(k), reason), []).extend(which[here & (kind == k)].tolist())
-        return np.where(none.any(axis=0) if self.strict else everywhere, kind, OK).astype(np.uint8)
+        return np.where(without.any(axis=0) if self.strict else everywhere, kind, OK).astype(np.uint8)
 
     def notes(self, shape: tuple[int, ...]) -> tuple[Note, ...]:
         """A note for each reason, with the index of its first point in an array of this shape."""
@@ -138,15 +138,16 @@ class _Goal:
         )
 
 
+# In the functions of a search `which` (k,) is the number of each of its points among all points.
 SearchResult = tuple[Floats, Floats, NDArray[np.uint8]]  # values (n,), directions (n, 3), status (n,)
 
 
 def _extreme_on_line(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
     """The extreme over the two ways along a line, at points `indices` (n,) of a search; see `_SEARCH`."""
     components = np.array([[1.0], [-1.0]]) if search.one_sided else np.array([[1.0]])
-    f, status = _sampled(search, indices, components, goal, which)
-    best = f.argmin(axis=0)
-    return _search_result(search, indices, goal.sign * f.min(axis=0), components[best], status)
+    costs, status = _sampled(search, indices, components, goal, which)
+    best = costs.argmin(axis=0)
+    return _search_result(search, indices, goal.sign * costs.min(axis=0), components[best], status)
 
 
 def _extreme_on_circle(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
@@ -154,15 +155,16 @@ def _extreme_on_circle(search: DirectionSearch, indices: Ints, goal: _Goal, whic
     count = 2 * IN_PLANE if search.one_sided else IN_PLANE
     step = float(np.pi / IN_PLANE)
     angles: Floats = np.asarray(step * np.arange(count), dtype=np.float64)
-    f, status = _sampled(search, indices, _unit_vectors(angles), goal, which)
-    expected, n = _parabola_minimum(f), np.arange(len(indices))
-    k = expected.argmin(axis=0)
-    lowest = f[k, n]
+    costs, status = _sampled(search, indices, _unit_vectors(angles), goal, which)  # (samples, points)
+    expected, n = _parabola_minimum(costs), np.arange(len(indices))
+    k = expected.argmin(axis=0)  # of each point the sample that is refined
+    lowest = costs[k, n]
     # a local minimum elsewhere, expected to be nearly as low
     second = expected.copy()
     for turn in (-1, 0, 1):
         second[(k + turn) % count, n] = np.inf
-    also = np.flatnonzero(second.min(axis=0) <= expected.min(axis=0) + NEAR * _spread(f))
+    also = np.flatnonzero(second.min(axis=0) <= expected.min(axis=0) + NEAR * _spread(costs))
+    # first searches from the first minimum of every point, then those from the second of some; `place`: whose
     start = np.concatenate([angles[k], angles[second.argmin(axis=0)[also]]])
     place = np.concatenate([n, also])
     keep = np.isfinite(lowest[place])
@@ -174,7 +176,7 @@ def _extreme_on_circle(search: DirectionSearch, indices: Ints, goal: _Goal, whic
     angle, value = _golden(cost, start - step, start + step)
     best_angle: Floats = angles[k]
     best = lowest.copy()
-    split = int(keep[: len(n)].sum())
+    split = int(keep[: len(n)].sum())  # number of the first searches
     for rows in (slice(0, split), slice(split, len(place))):
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
@@ -183,7 +185,8 @@ def _extreme_on_circle(search: DirectionSearch, indices: Ints, goal: _Goal, whic
 
 
 def _parabola_minimum(f: Floats) -> Floats:
-    """Value of each local minimum of samples f (s, n), by the parabola through its neighbours; inf elsewhere."""
+    """Expected value (s, n) of each local minimum of s samples f (s, n) round a circle, at the vertex of the
+    parabola through it and its neighbours; inf at samples that are no minimum."""
     left, right = np.roll(f, 1, axis=0), np.roll(f, -1, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         vertex = f - 0.125 * (left - right) ** 2 / (left - 2.0 * f + right)
@@ -191,23 +194,24 @@ def _parabola_minimum(f: Floats) -> Floats:
 
 
 def _golden(cost, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
-    """Argument and value (n,) of the minimum of n functions between bounds (n,), by golden sections.
+    """Argument (n,) and value (n,) of the minimum of n functions between bounds low and high (n,), by golden
+    sections.
 
     cost  arguments (n,) -> values (n,)
     """
-    a, b = low.copy(), high.copy()
+    a, b = low.copy(), high.copy()  # the bracket, with c < d inside; of these the higher becomes its end
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
     at_c, at_d = cost(c), cost(d)
     for _ in range(SECTIONS):
-        left = at_c < at_d
-        a, b = np.where(left, a, c), np.where(left, d, b)
-        old, at_old = np.where(left, c, d), np.where(left, at_c, at_d)
-        new = np.where(left, b - GOLDEN * (b - a), a + GOLDEN * (b - a))
+        c_is_lower = at_c < at_d
+        a, b = np.where(c_is_lower, a, c), np.where(c_is_lower, d, b)
+        old, at_old = np.where(c_is_lower, c, d), np.where(c_is_lower, at_c, at_d)
+        new = np.where(c_is_lower, b - GOLDEN * (b - a), a + GOLDEN * (b - a))
         at_new = cost(new)
-        c, d = np.where(left, new, old), np.where(left, old, new)
-        at_c, at_d = np.where(left, at_new, at_old), np.where(left, at_old, at_new)
-    left = at_c < at_d
-    return np.where(left, c, d), np.where(left, at_c, at_d)
+        c, d = np.where(c_is_lower, new, old), np.where(c_is_lower, old, new)
+        at_c, at_d = np.where(c_is_lower, at_new, at_old), np.where(c_is_lower, at_old, at_new)
+    c_is_lower = at_c < at_d
+    return np.where(c_is_lower, c, d), np.where(c_is_lower, at_c, at_d)
 
 
 def _extreme_on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
@@ -215,13 +219,15 @@ def _extreme_on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, whic
     points = sphere(2 * ON_SPHERE)
     points = points if search.one_sided else points[:ON_SPHERE]
     reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))  # rad, about the distance of two samples
-    f, status = _sampled(search, indices, points, goal, which)
-    k, n = f.argmin(axis=0), np.arange(len(indices))
-    lowest = f[k, n]
+    costs, status = _sampled(search, indices, points, goal, which)  # (samples, points)
+    k, n = costs.argmin(axis=0), np.arange(len(indices))
+    lowest = costs[k, n]
+    # a second minimum farther away, nearly as low
     cosine = points @ points[k].T
     near = cosine > np.cos(2.0 * reach) if search.one_sided else np.abs(cosine) > np.cos(2.0 * reach)
-    second = np.where(near, np.inf, f)
-    also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(f))
+    second = np.where(near, np.inf, costs)
+    also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(costs))
+    # first searches from the lowest sample of every point, then those from the second of some; `place`: whose
     start = np.concatenate([points[k], points[second.argmin(axis=0)[also]]])
     place = np.concatenate([n, also])
     value = np.concatenate([lowest, second.min(axis=0)[also]])
@@ -229,7 +235,7 @@ def _extreme_on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, whic
     start, place, value = start[keep], place[keep], value[keep]
     end, value = _compass(search, indices[place], start, value, goal, 0.6 * reach)  # half way, and a little more
     best, best_point = lowest.copy(), points[k].copy()
-    split = int(keep[: len(n)].sum())
+    split = int(keep[: len(n)].sum())  # number of the first searches
     for rows in (slice(0, split), slice(split, len(place))):
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
@@ -241,9 +247,11 @@ def _compass(
     search: DirectionSearch, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
 ) -> tuple[Floats, Floats]:
     """Compass search from directions u (n, 3): step to the lowest of eight directions around each, at an angle
-    that begins at `reach` [rad] and is halved where none of them is lower. Returns directions and values.
+    that begins at `reach` [rad] and is halved where none of them is lower.
 
     place  (n,)  index of the point of each direction
+    value  (n,)  its cost
+    Returns  directions (n, 3) and their costs (n,)
     """
     u, value, step = u.copy(), value.copy(), np.full(len(u), reach)
     for turn in range(COMPASS):
@@ -252,21 +260,21 @@ def _compass(
             break
         p, q = _tangents(u[busy])
         angle = 0.25 * np.pi * np.arange(8) + turn  # no axis is preferred
-        out = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q
-        trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * out
+        tangent = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q  # (8, busy, 3)
+        trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * tangent
         values = search.evaluate_along(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
-        f = goal.cost(values)
-        k, n = f.argmin(axis=0), np.arange(len(busy))
-        better = f[k, n] < value[busy]
+        costs = goal.cost(values)
+        k, n = costs.argmin(axis=0), np.arange(len(busy))
+        better = costs[k, n] < value[busy]
         improved = busy[better]
         u[improved] = trial[k, n][better]
-        value[improved] = f[k, n][better]
+        value[improved] = costs[k, n][better]
         step[busy[~better]] *= 0.5
     return u, value
 
 
 def _tangents(u: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (n, 3) each, at right angles to each of these (n, 3) and to each other."""
+    """Two unit vectors (n, 3) at right angles to each of the unit vectors u (n, 3), and to each other."""
     axis = np.eye(3)[np.abs(u).argmin(axis=1)]
     p = np.cross(u, axis)
     p /= np.linalg.norm(p, axis=1, keepdims=True)
@@ -293,7 +301,11 @@ def _unit_vectors(angle: Floats) -> Floats:
 def _sampled(
     search: DirectionSearch, indices: Ints, components: Floats, goal: _Goal, which: Ints
 ) -> tuple[Floats, NDArray[np.uint8]]:
-    """Cost (s, n) of s directions at n points, inf where there is no value; status (n,)."""
+    """Cost (s, n) of s directions at the n points `indices` of a search, inf where there is no value; status (n,)
+    of the points.
+
+    components  (s, r)  of the directions in each point's basis
+    """
     s, n = len(components), len(indices)
     samples = search.evaluate_along(np.tile(indices, s), np.repeat(components, n, axis=0))
     status = goal.status(samples, samples.status.reshape(s, n), which[indices])
@@ -310,12 +322,17 @@ def _spread(f: Floats) -> Floats:
 def _search_result(
     search: DirectionSearch, indices: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]
 ) -> SearchResult:
+    """The result of a search at n points: nan where the status is not OK.
+
+    values      (n,)    extreme values of the measure
+    components  (n, r)  of the extreme directions in each point's basis
+    """
     u = search.directions(indices, components)
     if not search.one_sided:  # of a direction and its opposite, the one that points along the first axis it can
         lead = np.take_along_axis(u, (np.abs(u) > 1e-9).argmax(axis=1)[:, None], axis=1)
         u = u * np.where(lead < 0.0, -1.0, 1.0)
-    none = status != OK
-    return np.where(none, np.nan, values), np.where(none[:, None], np.nan, u), status
+    without = status != OK
+    return np.where(without, np.nan, values), np.where(without[:, None], np.nan, u), status
 
 
 # Dimensions of the search -> function of search, indices (n,) of its points, goal, and `which` (k,): the number of
@@ -365,8 +382,8 @@ class DirectionSearch:
 
 
 def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, DirectionSearch]]:
-    """For each number of dimensions in which the handle can move: the indices of the points that are OK, and their
-    `DirectionSearch`. Under load the hand pushes as hard along each direction."""
+    """For each number of dimensions in which the handle can move: the indices (k,) of the points that are OK, and
+    their `DirectionSearch`. Under load the hand pushes as hard along each direction."""
     if point.load is not None:
         point = replace(point, load=point.load.along_every_direction)
     ok = np.flatnonzero(point.status == OK)
@@ -382,7 +399,7 @@ def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tupl
 
 
 def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
-    """Whether the opposite direction has another value, tried at a few points along an arbitrary direction."""
+    """Whether the opposite direction has another value, tried at TRIED points along an arbitrary direction."""
     n, r = len(basis), basis.shape[2]
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
     # a direction at no special angle
@@ -493,11 +510,11 @@ def _share_of_latitude(
 
     n = np.arange(len(indices))
     angles = step * np.arange(count)
-    m = margin(np.tile(n, count), np.repeat(angles, len(n))).reshape(count, len(n))
+    margins = margin(np.tile(n, count), np.repeat(angles, len(n))).reshape(count, len(n))
     # two marks for each sample: the sample itself, and what its parabola says lies next to it
-    mark, met = np.repeat(angles, 2)[:, None] * np.ones(len(n)), np.repeat(m >= 0.0, 2, axis=0)
-    sample, where, offset = _unsampled_crossings(m)
-    hidden = angles[sample] + step * offset
+    mark, met = np.repeat(angles, 2)[:, None] * np.ones(len(n)), np.repeat(margins >= 0.0, 2, axis=0)
+    sample, where, offset = _unsampled_crossings(margins)
+    hidden = angles[sample] + step * offset  # angle at which the sign may differ from both samples beside it
     hidden_met = margin(where, hidden) >= 0.0
     before = offset < 0.0
     # the one before its sample stands second in the pair of the sample before
@@ -508,15 +525,19 @@ def _share_of_latitude(
 
 
 def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
-    """Where the parabola through three neighbours of one sign changes its sign between them: index of the middle
-    sample, index of the point, and offset of the parabola's vertex from the sample in steps, -0.5 to 0.5."""
+    """Where the parabola through three neighbouring samples of one sign may change its sign between them.
+
+    m  (s, n)  margins of s samples round the circle, at n points
+    Returns    index of the middle sample, index of the point, and offset of the parabola's vertex from the sample
+               in steps, -0.5 to 0.5; (k,) each
+    """
     left, right = np.roll(m, 1, axis=0), np.roll(m, -1, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         bend = left - 2.0 * m + right
         offset = 0.5 * (left - right) / bend
         peak = m - 0.125 * (left - right) ** 2 / bend
         one_sign = ((left >= 0.0) == (m >= 0.0)) & ((right >= 0.0) == (m >= 0.0))
-        # generous, since the margin is not exactly a parabola
+        # the vertex lies towards 0; generous, since the margin is not exactly a parabola
         turning = (m * bend > 0.0) & (np.abs(offset) <= 0.5) & (peak * np.sign(m) < 0.5 * np.abs(m))
     sample, where = np.nonzero(one_sign & turning)
     return sample, where, offset[sample, where]
@@ -525,7 +546,7 @@ def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
 def _met_share(margin, mark: Floats, met: Flags, turn: float) -> Floats:  # type: ignore[no-untyped-def]
     """Share (n,) of the turn that meets the requirement: between marks that do; its ends are bisected between two.
 
-    margin  index of points and angles -> margin of the requirement
+    margin  indices of points (k,) and angles (k,) [rad] -> margins of the requirement (k,)
     mark    (s, n)  angles, ascending [rad];   met  (s, n)  whether it is met there
     turn    angle of the whole [rad]
     """
@@ -537,7 +558,7 @@ def _met_share(margin, mark: Floats, met: Flags, turn: float) -> Floats:  # type
         np.where(met[k, where], mark[k, where], after[k, where]),
         np.where(met[k, where], after[k, where], mark[k, where]),
     )
-    begin = inside.copy()
+    begin = inside.copy()  # the mark from which an arc that is met goes on to its end
     for _ in range(HALVINGS if len(k) else 0):
         middle = 0.5 * (inside + outside)
         good = margin(where, middle) >= 0.0

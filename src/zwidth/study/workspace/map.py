@@ -138,24 +138,26 @@ class MapJob:
         values, status, notes = [], [], []
         for measure in self.requested_measures:
             try:
-                v, s, n = self._column(measure, points)
+                measured, its_status, its_notes = self._column_values(measure, points)
             except MeasureError as error:
                 raise error.with_name(measure.name) from None
-            values.append(v)
-            status += [s] * v.shape[1]
-            here = tuple(Note(a.status, a.reason, a.count, (a.first[0] + first,)) for a in n)
-            notes += [here, *[()] * (v.shape[1] - 1)]
+            width = measured.shape[1]
+            values.append(measured)
+            status += [its_status] * width
+            # with the number of the cell in the map; once, with the first of the measure's columns
+            listed = tuple(Note(a.status, a.reason, a.count, (a.first[0] + first,)) for a in its_notes)
+            notes += [listed, *[()] * (width - 1)]
         return CellValues(np.concatenate(values, axis=1), np.stack(status, axis=1), tuple(notes))
 
     def _columns(self, measure: Measure) -> tuple[str, ...]:
         """Columns of one measure: its name, and the components of its extreme direction where it has one."""
-        directed = isinstance(self.direction, str) and measure.along
-        return (measure.name, *(f"{measure.name}_direction_{c}" for c in COMPONENTS if directed))
+        has_directions = isinstance(self.direction, str) and measure.along
+        return (measure.name, *(f"{measure.name}_direction_{c}" for c in COMPONENTS if has_directions))
 
-    def _column(
+    def _column_values(
         self, measure: Measure, points: OperatingPoint
     ) -> tuple[Floats, NDArray[np.uint8], tuple[Note, ...]]:
-        """Values (n, columns) of one measure at n points, status (n,) and notes."""
+        """Values (n, columns) of one measure at n points, see `_columns`; status (n,) and notes."""
         if not isinstance(self.direction, str) or not measure.along:
             result = evaluate(measure, points)
             return result.values[:, None], result.status, result.notes
@@ -290,11 +292,11 @@ def map_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
             "along": int(measure.along),
             "linear": int(measure.linear),
             "key": measure.key,
-            "notes": "\n".join(_sentence(note, plane) for note in cells.notes[column]),
+            "notes": "\n".join(_note_sentence(note, plane) for note in cells.notes[column]),
         }
         data[measure.name] = (axes, cells.values[:, column].reshape(plane.shape), attributes)
         status = cells.status[:, column].reshape(plane.shape)
-        data[f"{measure.name}_status"] = (axes, status, _flags())
+        data[f"{measure.name}_status"] = (axes, status, _status_attributes())
         if width > 1:
             directions = cells.values[:, column + 1 : column + width].reshape(*plane.shape, 3)
             title = {"title": f"{str(job.direction).capitalize()} direction of {measure.title.lower()}"}
@@ -307,7 +309,7 @@ def map_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     coordinates: dict[str, Any] = {"x_m": x, "y_m": y}
     if any("component" in variable[0] for variable in data.values()):
         coordinates["component"] = list(COMPONENTS)
-    return xr.Dataset(data, coordinates, _attributes(job))
+    return xr.Dataset(data, coordinates, _map_attributes(job))
 
 
 def measures_of(dataset: xr.Dataset) -> list[str]:
@@ -321,13 +323,13 @@ def reachable(dataset: xr.Dataset, name: str) -> Flags:
     return np.asarray(~np.isin(status, UNREACHED))
 
 
-def _flags() -> dict[str, Any]:
+def _status_attributes() -> dict[str, Any]:
     """Attributes of a variable of status: its values and their meanings."""
     meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
     return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
 
 
-def _sentence(note: Note, plane: PlaneGrid) -> str:
+def _note_sentence(note: Note, plane: PlaneGrid) -> str:
     """A note in words: how many cells, why they have no value, and where the first of them lies."""
     row, column = divmod(note.first[0], len(plane.x))
     x, y = (round(float(value), 12) + 0.0 for value in (plane.x[column], plane.y[row]))
@@ -347,7 +349,7 @@ def _check_reached(job: MapJob, cells: Cells) -> None:
     raise WorkspaceError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {reach}")
 
 
-def _attributes(job: MapJob) -> dict[str, Any]:
+def _map_attributes(job: MapJob) -> dict[str, Any]:
     """The map's device, plane, direction and wanted wall, as attributes that any file can hold."""
     from zwidth._version import __version__
 
@@ -402,7 +404,7 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
     import shapely
 
     table = np.reshape(np.asarray(dataset.attrs.get(KEY, ()), dtype=np.float64), (-1, 5))
-    if not len(table) or not _decided_by(table, dataset, name):
+    if not len(table) or not _reach_decided_by(table, dataset, name):
         return None
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=np.float64).reshape(2, 3)
     through = np.asarray(dataset.attrs["plane_through_m"], dtype=np.float64)
@@ -411,6 +413,8 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
     for *centre, least, most in table:
         offset = np.array(centre) - through
         middle, height = shapely.Point(axes @ offset), abs(float(np.cross(*axes) @ offset))
+        # the plane cuts a sphere of radius r, whose centre lies `height` beside it, in a circle of radius
+        # sqrt(r^2 - height^2)
         if height >= most:
             return shapely.Polygon()
         outline &= middle.buffer(np.sqrt(most**2 - height**2), quad_segs=QUARTER)
@@ -419,7 +423,7 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
     return outline
 
 
-def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
+def _reach_decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
     """Whether the reached cells of a map are exactly those that lie in all shells.
 
     table  (shells, 5)  of `shells_attribute`
@@ -435,7 +439,8 @@ def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
 
 
 def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
-    """The values (ny, nx) of a map, continued beyond the edge of reach within the range of the others.
+    """The values (ny, nx) of a map with this status (ny, nx), continued beyond the edge of reach within the range
+    of the others.
 
     The value of such a cell is extrapolated linearly from the next two cells along each row, column and diagonal
     that has them, and averaged; without two such cells it is the mean of its neighbours. A figure can then be cut
@@ -450,8 +455,8 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
     for _ in range(LAYERS):
         next_to, behind = _values_away(known, 1), _values_away(known, 2)
         with np.errstate(invalid="ignore"):
-            straight = _mean(2.0 * next_to - behind)
-        estimate = np.where(np.isnan(straight), _mean(next_to), straight)
+            straight = _mean_of_finite(2.0 * next_to - behind)
+        estimate = np.where(np.isnan(straight), _mean_of_finite(next_to), straight)
         known = np.where(beyond & np.isnan(known), np.clip(estimate, low, high), known)
     return known
 
@@ -465,8 +470,8 @@ def _values_away(values: Floats, steps: int) -> Floats:
     return np.stack([padded[i : i + rows, j : j + columns] for i, j in starts])
 
 
-def _mean(values: Floats) -> Floats:
-    """Mean of the finite values over the first axis; nan where there is none."""
+def _mean_of_finite(values: Floats) -> Floats:
+    """Mean (...) of the finite values over the first axis of values (k, ...); nan where there is none."""
     there = np.isfinite(values)
     total = np.where(there, values, 0.0).sum(axis=0)
     return np.where(there.any(axis=0), total / np.maximum(there.sum(axis=0), 1), np.nan)
@@ -495,7 +500,7 @@ def map_document(
         "x_m": dataset["x_m"].values,
         "y_m": dataset["y_m"].values,
         **each[names[0]],
-        "notes": [f"{name}: {note}" for name in names for note in _notes(dataset, name)],
+        "notes": [f"{name}: {note}" for name in names for note in _reason_sentences(dataset, name)],
     }
     document |= {"measures": each} if len(names) > 1 else {}
     return document | ({} if area is None else area.document())
@@ -507,12 +512,12 @@ def map_table(dataset: xr.Dataset) -> dict[str, Any]:
     x, y = np.meshgrid(dataset["x_m"].values, dataset["y_m"].values)
     table: dict[str, Any] = {"x_m": x.ravel(), "y_m": y.ravel()}
     if dataset.attrs["plane"] != "xy":
-        table |= _components("position", plane_positions(dataset), "_m")
+        table |= _component_columns("position", plane_positions(dataset), "_m")
     for name in measures_of(dataset):
         table[str(dataset[name].attrs["key"])] = dataset[name].values.ravel()
         table[f"{name}_status"] = NAMES[dataset[f"{name}_status"].values.ravel()]
         if f"{name}_direction" in dataset:
-            table |= _components(f"{name}_direction", dataset[f"{name}_direction"].values)
+            table |= _component_columns(f"{name}_direction", dataset[f"{name}_direction"].values)
     return table
 
 
@@ -521,7 +526,7 @@ def why_no_cell(dataset: xr.Dataset) -> str | None:
     names = measures_of(dataset)
     if any((dataset[f"{name}_status"].values == OK).any() for name in names):
         return None
-    notes = [note for name in names for note in _notes(dataset, name)]
+    notes = [note for name in names for note in _reason_sentences(dataset, name)]
     if not notes and any((dataset[f"{name}_status"].values == NO_EQUILIBRIUM).any() for name in names):
         return (
             f"no cell has a value: in none that is reached is there an equilibrium under {dataset.attrs['load']}"
@@ -540,18 +545,18 @@ def _measure_document(dataset: xr.Dataset, name: str, device: Device | None) -> 
         "values": dataset[name].values,
         "status": NAMES[dataset[f"{name}_status"].values],
         "overall": over_the_workspace(dataset, name, device),
-        "notes": _notes(dataset, name),
+        "notes": _reason_sentences(dataset, name),
     }
     directed = f"{name}_direction"
     return document | ({"directions": dataset[directed].values} if directed in dataset else {})
 
 
-def _notes(dataset: xr.Dataset, name: str) -> list[str]:
+def _reason_sentences(dataset: xr.Dataset, name: str) -> list[str]:
     """Why cells have no value of a measure, a sentence for each reason."""
     return str(dataset[name].attrs["notes"]).splitlines()
 
 
-def _components(name: str, vectors: Sequence[Any] | np.ndarray, unit: str = "") -> dict[str, Any]:
+def _component_columns(name: str, vectors: Sequence[Any] | np.ndarray, unit: str = "") -> dict[str, Any]:
     """Columns name_x, name_y, name_z of vectors (..., 3), with the unit's ending."""
     rows = np.reshape(vectors, (-1, 3))
     return {f"{name}_{axis}{unit}": rows[:, k] for k, axis in enumerate("xyz")}

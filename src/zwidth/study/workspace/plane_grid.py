@@ -103,14 +103,21 @@ def plane_of(
         raise WorkspaceError(
             "the handle has one drive and moves along a curve; a map needs a device with two drives"
         )
-    own = _reach_normal(reach.positions)
-    first, second, names = _axes(axes, own)
-    _check_intersection(np.cross(first, second), point, own, reach)
+    reach_normal = _reach_normal(reach.positions)
+    first, second, names = _plane_axes(axes, reach_normal)
+    _check_intersection(np.cross(first, second), point, reach_normal, reach)
     sides = (("x", x, first), ("y", y, second))
     ranges = [_range_along(name, given, axis, mechanism.workspace, reach) for name, given, axis in sides]
-    nx, ny = _counts(cells, ranges)
+    nx, ny = _point_counts(cells, ranges)
     normal = np.cross(first, second)
-    return PlaneGrid(first, second, (point @ normal) * normal, _line(*ranges[0], nx), _line(*ranges[1], ny), names)
+    return PlaneGrid(
+        first,
+        second,
+        (point @ normal) * normal,
+        _line_coordinates(*ranges[0], nx),
+        _line_coordinates(*ranges[1], ny),
+        names,
+    )
 
 
 @dataclass(frozen=True)
@@ -129,6 +136,7 @@ class ReachableSet:
         along = self.positions @ axis
         low, high = float(along.min()), float(along.max())
         margin = BETWEEN * (high - low)
+        # no farther than every shell allows, but for what is known to be reached
         allowed = [(float(shell.centre @ axis), float(shell.most)) for shell in self.shells]
         return (
             max([low - margin, *(min(low, centre - most) for centre, most in allowed)]),
@@ -138,7 +146,7 @@ class ReachableSet:
     def __str__(self) -> str:
         boxed = zip("xyz", (self.extent(axis) for axis in np.eye(3)), strict=True)
         return ", ".join(
-            f"{axis} from {a:.4g} to {b:.4g} m" if b - a > FLAT else f"{axis} = {_short(a)} m"
+            f"{axis} from {a:.4g} to {b:.4g} m" if b - a > FLAT else f"{axis} = {_coordinate_text(a)} m"
             for axis, (a, b) in boxed
         )
 
@@ -148,20 +156,20 @@ def reachable_set(mechanism: Mechanism, assembly: str | None) -> ReachableSet:
     return ReachableSet(reachable_positions(mechanism, assembly), tuple(shells(pack(mechanism), 0)))
 
 
-def _short(value: float) -> str:
+def _coordinate_text(value: float) -> str:
     """A coordinate as text, of 4 digits, without a rounding error beside 0."""
     return f"{round(value, 9) + 0.0:.4g}"
 
 
 def _reach_normal(reach: Floats) -> Floats | None:
-    """Normal (3,) of the plane that all positions lie in; None if they lie in none."""
+    """Normal (3,) of the plane that all positions `reach` (K, 3) lie in; None if they lie in none."""
     _, spread, axes = np.linalg.svd(reach - reach.mean(axis=0), full_matrices=False)
     if len(spread) < 3 or spread[2] > FLAT * spread[0]:
         return None
     return np.asarray(axes[2])
 
 
-def _axes(
+def _plane_axes(
     requested_axes: str | Sequence[float] | None, reach_normal: Floats | None
 ) -> tuple[Floats, Floats, tuple[str, str]]:
     """Unit vectors (3,) of the plane's axes, and their names. Raises WorkspaceError for axes that are none.
@@ -197,37 +205,50 @@ def _axes(
 
 
 def _orthonormal(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors along a, and across it towards b. Raises WorkspaceError for a zero or parallel vector."""
+    """Unit vectors (3,) along a (3,), and across it towards b (3,). Raises WorkspaceError for a zero or parallel
+    vector."""
     lengths = [float(np.linalg.norm(v / (np.abs(v).max() or 1.0))) for v in (a, b)]
     if not all(lengths):
         raise WorkspaceError(
-            f"an axis of the plane has length 0: {_text(a)} and {_text(b)}; give two vectors that are not zero"
+            f"an axis of the plane has length 0: {_vector_text(a)} and {_vector_text(b)}; give two vectors that "
+            "are not zero"
         )
     first, other = (v / np.abs(v).max() / length for v, length in zip((a, b), lengths, strict=True))
     second = other - (first @ other) * first
     across = float(np.linalg.norm(second))
     if across < PARALLEL:
-        raise WorkspaceError(f"the plane's axes {_text(a)} and {_text(b)} are parallel; give two that are not")
+        raise WorkspaceError(
+            f"the plane's axes {_vector_text(a)} and {_vector_text(b)} are parallel; give two that are not"
+        )
     return first, second / across
 
 
-def _text(v: Floats) -> str:
-    """A vector as text."""
+def _vector_text(v: Floats) -> str:
+    """A vector as text with its components in brackets, of 6 digits each."""
     return "(" + ", ".join(f"{c:.6g}" for c in v) + ")"
 
 
-def _check_intersection(normal: Floats, point: Floats, own: Floats | None, reach: ReachableSet) -> None:
-    """Raises WorkspaceError where a handle that cannot leave its own plane meets this one in a line or nowhere."""
-    if own is None:
+def _check_intersection(normal: Floats, point: Floats, reach_normal: Floats | None, reach: ReachableSet) -> None:
+    """Raise WorkspaceError where a handle that cannot leave its own plane meets the requested one in a line or
+    nowhere.
+
+    normal, point  (3,)  of the requested plane; the point [m]
+    reach_normal   (3,)  normal of the handle's own plane; None where it can leave every plane
+    """
+    if reach_normal is None:
         return
-    known, k = reach.positions, int(np.argmax(np.abs(own)))
-    aligned = bool(abs(own[k]) > 1.0 - PARALLEL**2)
+    known, k = reach.positions, int(np.argmax(np.abs(reach_normal)))
+    aligned = bool(abs(reach_normal[k]) > 1.0 - PARALLEL**2)
     plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
-    where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_text(own)}"
-    if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
+    where = (
+        f"the plane {'xyz'[k]} = {_coordinate_text(known[0, k])} m"
+        if aligned
+        else f"the plane across {_vector_text(reach_normal)}"
+    )
+    if np.linalg.norm(np.cross(normal, reach_normal)) > PARALLEL:
         advice = Advice("ask for {}", "axes", plane) if plane else Advice("leave {} out", "axes")
         raise WorkspaceError(f"the handle cannot leave {where}, and meets the requested plane in a line", advice)
-    off = float(abs((point - known[0]) @ own))
+    off = float(abs((point - known[0]) @ reach_normal))
     if off > FLAT * float(np.ptp(known, axis=0).max()):
         raise WorkspaceError(
             f"the handle cannot leave {where}, and the requested plane lies {off:.4g} m beside it; it reaches "
@@ -251,6 +272,7 @@ def _range_along(
         return low, high
     if np.isnan(bounds[axis != 0.0]).any():
         return rounded_outwards(*reach.extent(axis))
+    # lowest and highest coordinate of a box: of each side of it the end that lies farther that way
     ends = np.where(axis[:, None] != 0.0, axis[:, None] * bounds, 0.0)
     return float(ends.min(axis=1).sum()), float(ends.max(axis=1).sum())
 
@@ -268,8 +290,9 @@ def rounded_outwards(low: float, high: float) -> tuple[float, float]:
     return floor(low * per_metre + 1e-6) / per_metre, ceil(high * per_metre - 1e-6) / per_metre
 
 
-def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) -> tuple[int, int]:
-    """Points along both axes, as `plane_of` reads them. Raises WorkspaceError for too few or too many."""
+def _point_counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) -> tuple[int, int]:
+    """Numbers of points along both axes, from `cells` of `plane_of` and the ranges [m]. Raises WorkspaceError for
+    too few or too many."""
     if cells is None:
         lengths = [high - low for low, high in ranges]
         if not min(lengths) > 0.0:
@@ -285,10 +308,10 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
     return nx, ny
 
 
-def _line(low: float, high: float, count: int) -> Floats:
+def _line_coordinates(low: float, high: float, count: int) -> Floats:
     """`count` equidistant coordinates [m], symmetric about 0 if the ends are, rounded to short decimals.
 
-    >>> _line(-0.3, 0.3, 9).tolist()
+    >>> _line_coordinates(-0.3, 0.3, 9).tolist()
     [-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3]
     """
     k = np.arange(count)
