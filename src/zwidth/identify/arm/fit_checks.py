@@ -38,6 +38,7 @@ GRAVITY: Final = 0.3  # share of the unexplained torque that gravity explains, f
 REMAINDER: Final = 0.3  # the same of other friction, and of a drift
 SLOW: Final = 0.1  # share of the usual speed over which friction at low speed falls
 LEAST_OTHER: Final = 1e-6  # share of a column that must not be in the others
+LAGS: Final = 16  # of the errors' autocovariances
 SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
 
 
@@ -330,3 +331,25 @@ class TorqueComparison:
         # the driven joints where the record has them, turns included
         moved[driven] = np.linalg.solve(mech.to_drive[0], stretch.coordinates[0])
         return moved
+
+
+def error_sources(
+    band: TorqueBand, fit: Regression, seen: Sequence[Compared], noisy: Sequence[Sequence[Compared]]
+) -> list[Floats]:
+    """Autocovariances (t, d) at the lags 0, 1, ... of what the sources of error make of the residuals: first of
+    white noise of the torques, then of noise of the positions, each in a unit of its own.
+
+    noisy  pairs of `_with_noise_of_both_signs`
+    """
+    taps, thin = band.narrow.taps(band.step), band.thinning
+    filtered = np.convolve(taps, taps[::-1])[len(taps) - 1 :: thin]  # white noise behind the kernel
+    lags = min(len(filtered), LAGS)
+    white = np.tile(filtered[:lags, None], (1, seen[0].torques.shape[1]))
+    best = np.append(fit.values, 0.0)
+    by_positions = np.zeros_like(white)
+    for plus, minus in zip(noisy[::2], noisy[1::2], strict=False):
+        for one, other in zip(plus, minus, strict=True):
+            error = 0.5 * ((one.columns - other.columns) @ best)
+            for k in range(min(lags, len(error))):
+                by_positions[k] += np.sum(error[: len(error) - k] * error[k:], axis=0)
+    return [white, by_positions]

@@ -47,6 +47,7 @@ from zwidth.identify.arm.fit_checks import (
     Compared,
     TorqueComparison,
     consistency_check,
+    error_sources,
     excitation_check,
     gravity_check,
     length_check,
@@ -83,7 +84,6 @@ NOT_WRITTEN: Final = (
     "noise in the positions is not in the intervals of 'identify arm', so that its numbers are not put into a "
     "device file; compare them with other records, and write by hand what you trust"
 )
-LAGS: Final = 16  # of the errors' autocovariances
 
 
 @dataclass(frozen=True, repr=False)
@@ -587,28 +587,6 @@ def _unbiased(fit: Regression, noisy: Sequence[Sequence[Compared]]) -> Floats:
         return fit.values
     found = [fit.refitted([o.columns for o in one], [o.torques for o in one]) for one in noisy[:whole]]
     return np.asarray(2.0 * fit.values - np.mean(found, axis=0))
-
-
-def error_sources(
-    band: TorqueBand, fit: Regression, seen: Sequence[Compared], noisy: Sequence[Sequence[Compared]]
-) -> list[Floats]:
-    """Autocovariances (t, d) at the lags 0, 1, ... of what the sources of error make of the residuals: first of
-    white noise of the torques, then of noise of the positions, each in a unit of its own.
-
-    noisy  pairs of `_with_noise_of_both_signs`
-    """
-    taps, thin = band.narrow.taps(band.step), band.thinning
-    filtered = np.convolve(taps, taps[::-1])[len(taps) - 1 :: thin]  # white noise behind the kernel
-    lags = min(len(filtered), LAGS)
-    white = np.tile(filtered[:lags, None], (1, seen[0].torques.shape[1]))
-    best = np.append(fit.values, 0.0)
-    by_positions = np.zeros_like(white)
-    for plus, minus in zip(noisy[::2], noisy[1::2], strict=False):
-        for one, other in zip(plus, minus, strict=True):
-            error = 0.5 * ((one.columns - other.columns) @ best)
-            for k in range(min(lags, len(error))):
-                by_positions[k] += np.sum(error[: len(error) - k] * error[k:], axis=0)
-    return [white, by_positions]
 
 
 def _explained_shares(validation: Sequence[Compared], best: Floats) -> tuple[list[float], float]:

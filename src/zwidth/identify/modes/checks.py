@@ -21,7 +21,7 @@ from zwidth.identify.modes.local_response import RecordResponse
 from zwidth.identify.modes.modal_fit import ModalFit
 from zwidth.identify.modes.model import SampledModel, sampled_response, without_hand
 from zwidth.identify.modes.overview import Spectra
-from zwidth.identify.modes.stretches import Levels, Source
+from zwidth.identify.modes.stretches import Channels, Levels, Source
 from zwidth.loop.operating_point import OperatingPoint
 
 COUNTS: Final = 10.0  # steps of the encoder that a motion must have
@@ -377,3 +377,24 @@ def hand_check(data: RecordResponse, model: SampledModel, point: OperatingPoint)
     if change < SEEN:
         reason += ": the device hides the hand; drive it harder, or at frequencies at which the handle moves"
     return Check("hand", change >= SEEN, reason)
+
+
+def input_check(channels: Channels) -> Check:
+    """Say which column is taken for the command; always passed."""
+    if channels.measured:
+        text = f"the response is from {channels.force}, what was commanded; {channels.measured} was measured"
+    else:
+        text = (
+            f"{channels.force} is taken for what was commanded and held; if it was measured, give the command as "
+            f"command_{channels.force.partition('_')[2]} beside it"
+        )
+    return Check("input", True, text)
+
+
+def unfollowed_check(share: float) -> Check:
+    """Say that too small a share of the unseen motion follows a force with flat tops."""
+    reason = (
+        f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another "
+        "force acted there than is written; drive less, or write what the amplifier gave"
+    )
+    return Check("validation", False, reason)

@@ -26,12 +26,14 @@ from zwidth.identify.modes.checks import (
     flip_check,
     force_excitation_check,
     hand_check,
+    input_check,
     level_checks,
     order_check,
     resolution_check,
     shift_check,
     sign_and_unit_checks,
     slope_of,
+    unfollowed_check,
 )
 from zwidth.identify.modes.local_response import (
     BandedRecord,
@@ -64,7 +66,7 @@ from zwidth.identify.modes.overview import (
     survey_of,
 )
 from zwidth.identify.modes.physical_fit import PhysicalFit, device_estimates, fit_model, modal_estimates
-from zwidth.identify.modes.stretches import KEPT, Channels, Levels, Source, Stretch, channels_of
+from zwidth.identify.modes.stretches import KEPT, Levels, Source, Stretch, channels_of
 from zwidth.identify.records.record import Columns, Record
 from zwidth.identify.records.sampling import check_sampling
 from zwidth.loop.operating_point import OperatingPoint
@@ -228,7 +230,7 @@ def _check_survey(
     if not all(check.passed for check in checks[-2:]):  # all else would be said of what is not so
         return _Seen(checks, chosen, value, coherence, excited, 0.0)
     checks.append(_check_feedback_or_reference(point, loudest, spectra.period, closed))
-    checks.append(_input_check(sources[0].channels))
+    checks.append(input_check(sources[0].channels))
     check, top = coherence_check(spectra, excited, closed)
     checks.append(check)
     if checks[-1].passed or checks[-1].warning:
@@ -263,18 +265,6 @@ def _check_feedback_or_reference(point: OperatingPoint, loudest: Stretch, period
         return Check("feedback", True, "the reference of the centring loop is recorded: S_yr/S_ur is used")
     free = bool(np.any(squared == 0.0))
     return feedback_check(loudest.force, loudest.position, period, free)
-
-
-def _input_check(channels: Channels) -> Check:
-    """Say which column is taken for the command; always passed."""
-    if channels.measured:
-        text = f"the response is from {channels.force}, what was commanded; {channels.measured} was measured"
-    else:
-        text = (
-            f"{channels.force} is taken for what was commanded and held; if it was measured, give the command as "
-            f"command_{channels.force.partition('_')[2]} beside it"
-        )
-    return Check("input", True, text)
 
 
 def _identified(
@@ -318,7 +308,7 @@ def _identified(
     curves = _curves(survey.spectra, seen, fitted)
     share = explained_share(unseen_part, fitted)
     if _force_is_clipped(checks, data.sources) and share < FOLLOWED:
-        return Identification("modes", device.label, (*checks, _unfollowed_check(share)))
+        return Identification("modes", device.label, (*checks, unfollowed_check(share)))
     text = f"{data.unseen}, predicted from its force"
     return Identification(
         "modes", device.label, tuple(checks), tuple(estimates), share, text, tuple(remarks), curves, details
@@ -372,15 +362,6 @@ def _details(seen: _Seen, survey: Survey, difference: float, misfit: float, turn
         "modal_misfit": misfit,
         "turns": turns,
     }
-
-
-def _unfollowed_check(share: float) -> Check:
-    """Say that too small a share of the unseen motion follows a force with flat tops."""
-    reason = (
-        f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another "
-        "force acted there than is written; drive less, or write what the amplifier gave"
-    )
-    return Check("validation", False, reason)
 
 
 def _force_is_clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
