@@ -41,6 +41,8 @@ IMPLAUSIBLE: Final = 20.0  # ratio of the response to the device's, either way, 
 FACTORS_LINEAR: Final = {1e3: "millimetres", 1e6: "micrometres", 1e-3: "kilometres, or the force in millinewtons"}
 FACTORS_TURN: Final = {180.0 / np.pi: "degrees", 1e3: "milliradians", 1e-3: "the torque in millinewton metres"}
 NEAR: Final = 1.6  # by which a ratio may differ from such a factor
+FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
+LEVELS_READ: Final = 100_000  # samples in which they are counted
 
 
 def level_checks(source: Source, levels: Levels, step: float, given_step: float, limit: float) -> list[Check]:
@@ -398,3 +400,11 @@ def unfollowed_check(share: float) -> Check:
         "force acted there than is written; drive less, or write what the amplifier gave"
     )
     return Check("validation", False, reason)
+
+
+def force_is_clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
+    """Whether a force has flat tops and is none that steps between a few levels on purpose."""
+    if all(check.passed for check in checks if check.what == "saturation"):
+        return False
+    first = [one for one in (source.first() for source in sources) if one is not None]
+    return any(len(np.unique(one.force[:LEVELS_READ])) > FEW_LEVELS for one in first)

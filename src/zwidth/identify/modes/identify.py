@@ -25,6 +25,7 @@ from zwidth.identify.modes.checks import (
     feedback_check,
     flip_check,
     force_excitation_check,
+    force_is_clipped,
     hand_check,
     input_check,
     level_checks,
@@ -85,8 +86,6 @@ MOST_ROUNDS: Final = 8
 SHIFTED: Final = -0.5  # samples of delay, below which nothing more is fitted
 MISFIT: Final = 1.5  # by which residuals may exceed the noise before a model is said to miss something
 FOLLOWED: Final = 0.97  # share of the unseen motion that follows a force with flat tops, if it is what acted
-FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
-LEVELS_READ: Final = 100_000  # samples in which they are counted
 CURVE: Final = 2000  # points of a curve at most
 
 
@@ -307,7 +306,7 @@ def _identified(
     fitted = modal.response if found is None or numbers is None else partial(numbers.response, found.fit.values)
     curves = _curves(survey.spectra, seen, fitted)
     share = explained_share(unseen_part, fitted)
-    if _force_is_clipped(checks, data.sources) and share < FOLLOWED:
+    if force_is_clipped(checks, data.sources) and share < FOLLOWED:
         return Identification("modes", device.label, (*checks, unfollowed_check(share)))
     text = f"{data.unseen}, predicted from its force"
     return Identification(
@@ -362,14 +361,6 @@ def _details(seen: _Seen, survey: Survey, difference: float, misfit: float, turn
         "modal_misfit": misfit,
         "turns": turns,
     }
-
-
-def _force_is_clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
-    """Whether a force has flat tops and is none that steps between a few levels on purpose."""
-    if all(check.passed for check in checks if check.what == "saturation"):
-        return False
-    first = [one for one in (source.first() for source in sources) if one is not None]
-    return any(len(np.unique(one.force[:LEVELS_READ])) > FEW_LEVELS for one in first)
 
 
 def _damping_remark(difference: float) -> str:
