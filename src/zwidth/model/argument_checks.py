@@ -57,7 +57,7 @@ def check_kind(name: str, value: object, kind: type[T] | tuple[type[Any], ...], 
 
 
 def wrong_type(name: str, wanted: str, value: object, hint: str = "") -> TypeError:
-    """The error for an argument of another kind than is wanted."""
+    """The error for an argument of another kind than is wanted ("a Loop"); hint: what to type instead."""
     return TypeError(f"{name} must be {wanted}, got {describe_value(value)}" + (f"; {hint}" if hint else ""))
 
 
@@ -169,12 +169,15 @@ def check_choice(name: str, value: object, choices: Iterable[str]) -> None:
 
 
 def _is_number(value: object) -> bool:
+    """Whether the value is a real number; True and False are none."""
     return isinstance(value, Real) and not isinstance(value, bool)  # numpy's numbers are registered as such
 
 
 def _quoted(text: str) -> str:
+    """The text in quotes, cut to LONGEST characters."""
     return repr(text if len(text) <= LONGEST else text[: LONGEST - 3] + "...")
 
 
 def _article(noun: str) -> str:
+    """The article "an" before a noun that begins with a capital vowel, as names of classes do, else "a"."""
     return "an" if noun[:1] in "AEIOU" else "a"

@@ -58,55 +58,73 @@ def attach_arm(plant: Plant, arm: Arm, handle: Floats, place: Floats, force: Flo
     Returns  Plant, the arm's joints among its last coordinates
     Raises   OperatorError  where the arm cannot reach the handle, or cannot move with it
     """
-    motions = Motions(pack(arm.mechanism), _posture(arm, place))
+    motions = Motions(pack(arm.mechanism), _arm_posture(arm, place))
     hand, links, joints = motions.handle, arm.mechanism.links, motions.unknowns
-    none = np.zeros(len(links.names))
+    zeros = np.zeros(len(links.names))
     springs, dampers = (
-        np.diag((none if each is None else np.asarray(each))[joints])
+        np.diag((zeros if each is None else np.asarray(each))[joints])
         for each in (links.joint_stiffness, links.joint_damping)
     )
-    own = springs + np.tensordot(force, hand.speed_2, 1) - motions.weight(gravity)[1]
+    # K + F . d2x/dq2 - dw/dq, see the head of this file
+    arm_stiffness = springs + np.tensordot(force, hand.speed_2, 1) - motions.weight(gravity)[1]
     names = tuple(f"arm {links.names[joint]}" for joint in joints)
-    both = plant.padded(names)
-    at = slice(plant.size, None)
-    both.mass[at, at], both.damping[at, at], both.stiffness[at, at] = motions.mass_matrix(), dampers, own
-    slip = np.hstack([-handle, hand.speed])
+    uncoupled = plant.padded(names)
+    of_arm = slice(plant.size, None)
+    uncoupled.mass[of_arm, of_arm], uncoupled.damping[of_arm, of_arm], uncoupled.stiffness[of_arm, of_arm] = (
+        motions.mass_matrix(),
+        dampers,
+        arm_stiffness,
+    )
+    slip = np.hstack([-handle, hand.speed])  # velocity of the hand against the handle per unit rate, (3, n + a)
     if arm.grasp_stiffness is not None:
         grasp = slip.T @ slip
         return replace(
-            both,
-            damping=both.damping + arm.grasp_damping * grasp,
-            stiffness=both.stiffness + arm.grasp_stiffness * grasp,
+            uncoupled,
+            damping=uncoupled.damping + arm.grasp_damping * grasp,
+            stiffness=uncoupled.stiffness + arm.grasp_stiffness * grasp,
         )
-    return replace(both.on_motions(_together(handle, hand.speed)), names=(*plant.names, *_kept(names, hand.speed)))
+    return replace(
+        uncoupled.on_motions(_shared_motions(handle, hand.speed)),
+        names=(*plant.names, *_names_of_arm_motions(names, hand.speed)),
+    )
 
 
-def _together(handle: Floats, hand: Floats) -> Floats:
-    """The motions (n + a, n + a - 3 or more) in which hand and handle move together: the device's coordinates, and
-    the arm's own."""
-    left, size, right = np.linalg.svd(hand)
-    rank = int(np.count_nonzero(size > STRETCHED * size[0])) if len(size) else 0
-    lost = handle.T @ left[:, rank:]
-    if np.max(np.abs(lost), initial=0.0) > STRETCHED * np.max(np.abs(handle), initial=0.0):
+def _shared_motions(handle: Floats, hand: Floats) -> Floats:
+    """Motions (n + a, n + a - r) in which hand and handle move together, r being the rank of `hand`: the first n
+    move the handle and the arm with it, the others the arm alone.
+
+    handle, hand  (3, n), (3, a)  velocity per unit rate of each coordinate of the plant, of each joint of the arm
+    Raises        OperatorError   where the hand cannot follow the handle
+    """
+    left, singular, right = np.linalg.svd(hand)
+    rank = int(np.count_nonzero(singular > STRETCHED * singular[0])) if len(singular) else 0
+    out_of_reach = handle.T @ left[:, rank:]
+    if np.max(np.abs(out_of_reach), initial=0.0) > STRETCHED * np.max(np.abs(handle), initial=0.0):
         raise OperatorError(
             "the arm cannot move its hand in every direction in which the handle moves; is it stretched, or does "
             "it need another joint? Bend it in its posture, or give it an elastic grasp"
         )
     n, a = handle.shape[1], hand.shape[1]
     follow = np.linalg.pinv(hand, rcond=STRETCHED) @ handle
-    alone = right[rank:].T
-    return np.block([[np.eye(n), np.zeros((n, a - rank))], [follow, alone]])
+    arm_only = right[rank:].T
+    return np.block([[np.eye(n), np.zeros((n, a - rank))], [follow, arm_only]])
 
 
-def _kept(names: tuple[str, ...], hand: Floats) -> tuple[str, ...]:
-    """Names of the motions that the arm has beside those of the handle."""
-    size = np.linalg.svd(hand, compute_uv=False)
-    rank = int(np.count_nonzero(size > STRETCHED * size[0])) if len(size) else 0
-    return tuple(f"arm {i + 1}" for i in range(len(names) - rank))
+def _names_of_arm_motions(joint_names: tuple[str, ...], hand: Floats) -> tuple[str, ...]:
+    """The names "arm 1", "arm 2", ... of the motions of the arm that leave the hand at rest, as many as it has
+    joints beyond the rank of `hand` (3, a), its velocity per unit rate of each joint.
+    """
+    singular = np.linalg.svd(hand, compute_uv=False)
+    rank = int(np.count_nonzero(singular > STRETCHED * singular[0])) if len(singular) else 0
+    return tuple(f"arm {i + 1}" for i in range(len(joint_names) - rank))
 
 
-def _posture(arm: Arm, place: Floats) -> Floats:
-    """Joint coordinates of the arm with its hand at a place, from those of its assembly by least motion."""
+def _arm_posture(arm: Arm, place: Floats) -> Floats:
+    """Joint coordinates (a,) of the arm with its hand at a place (3,) [m], from those of its assembly by least
+    motion.
+
+    Raises  OperatorError  where the hand cannot get there
+    """
     angles = np.array(arm.mechanism.assemblies["held"], dtype=np.float64)
     if arm.shoulder is None:
         return angles
@@ -123,10 +141,10 @@ def _posture(arm: Arm, place: Floats) -> Floats:
         if moved is None or not np.max(np.abs(step)) > 0.0:
             break
         angles = moved
-    left = float(np.linalg.norm(goal - Motions(mech, angles).handle.position))
-    if left <= 1e-9:
+    distance = float(np.linalg.norm(goal - Motions(mech, angles).handle.position))
+    if distance <= 1e-9:
         return angles
     raise OperatorError(
-        f"the arm does not reach the handle from its shoulder: {left:.4g} m are left; move shoulder_m, or give "
-        "the posture in which it holds the handle"
+        f"the arm does not reach the handle from its shoulder: {distance:.4g} m are left; move shoulder_m, or "
+        "give the posture in which it holds the handle"
     )

@@ -120,6 +120,7 @@ def assumed_modes(
     check_choice("boundary", boundary, BOUNDARIES)
     L = beam.length
     loaded = _loaded(at) if boundary == "clamped" else np.union1d(_loaded(at), [L])
+    # half waves of the highest mode are L / (modes + 1) or longer: two panels for each
     edges = _divided(np.union1d(loaded, [0.0, L]), L / (2.0 * modes + 2.0))
     panels = gauss_panels(edges, MODE_ORDER)
 
@@ -168,7 +169,7 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
     tip = body_of_shapes(beam, shapes, panels, np.append(at, L))
     m, I = beam.mass_per_length * L, beam.torsional_inertia_per_length * L
     lump = m * np.array([BAR_LUMP, BENDING_LUMP, BENDING_LUMP])
-    coupling = np.zeros((6, 4))
+    coupling = np.zeros((6, 4))  # velocity and angular velocity of the base by the four coordinates of the tip
     coupling[:3, :3] = np.diag(lump)
     coupling[3, 3], coupling[4, 2], coupling[5, 1] = BAR_LUMP * I, -L * lump[2], L * lump[1]
     mass = np.block([[rod_inertia(beam), coupling], [coupling.T, np.diag([*lump, BAR_LUMP * I])]])
@@ -185,10 +186,16 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
 
 
 def _craig_bampton(M: Floats, K: Floats, family: Ints, interface: int, modes: int) -> Floats:
-    """T (e, interface + modes): the first coordinates held one after the other, then the modes with all held.
+    """Craig and Bampton's basis T (e, interface + modes): eps = T (interface coordinates, amplitudes of modes).
 
-    family  (e,) of each coordinate: coordinates of different families are not coupled. Of equal frequencies, as of
-            a round section in both planes, the one of the first family comes first on every processor
+    Its first columns are the static deflections as one of the first `interface` coordinates is 1 and the others of
+    them are 0, the next ones the lowest modes with all of them held at 0.
+
+    M, K    (e, e)  mass and stiffness of the beam with its base held
+    family  (e,)    number of the family of each coordinate: those of different families are not coupled. Of equal
+                    frequencies, as of a round section in both planes, the one of the first family comes first on
+                    every processor
+    Raises  ValueError  for more modes than there are
     """
     from scipy.linalg import eigh, solve
 
@@ -202,24 +209,32 @@ def _craig_bampton(M: Floats, K: Floats, family: Ints, interface: int, modes: in
     T[:interface, :interface] = np.eye(interface)
     if e > interface:
         T[inner, :interface] = -solve(K[inner, inner], K[inner, :interface], assume_a="pos")
-    found: list[tuple[float, int, Ints, Floats]] = []
-    for one in range(int(np.max(family, initial=-1)) + 1 if modes else 0):
-        own = interface + np.flatnonzero(family[inner] == one)
-        if len(own):
-            squared, shapes = eigh(K[np.ix_(own, own)], M[np.ix_(own, own)])
-            found += [(w, one, own, shape) for w, shape in zip(squared.tolist(), shapes.T, strict=True)]
-    found.sort(key=lambda mode: mode[0])
-    for i in range(1, len(found)):
-        if found[i][1] < found[i - 1][1] and found[i][0] - found[i - 1][0] <= REPEATED * found[i][0]:
-            found[i - 1], found[i] = found[i], found[i - 1]
-    for k, (_, _, own, shape) in enumerate(found[:modes]):
-        T[own, interface + k] = shape
+    # squared frequency, family, the family's coordinates, mode on these
+    by_frequency: list[tuple[float, int, Ints, Floats]] = []
+    for number in range(int(np.max(family, initial=-1)) + 1 if modes else 0):
+        members = interface + np.flatnonzero(family[inner] == number)
+        if len(members):
+            squared, shapes = eigh(K[np.ix_(members, members)], M[np.ix_(members, members)])
+            by_frequency += [
+                (w, number, members, shape) for w, shape in zip(squared.tolist(), shapes.T, strict=True)
+            ]
+    by_frequency.sort(key=lambda mode: mode[0])
+    for i in range(1, len(by_frequency)):
+        if (
+            by_frequency[i][1] < by_frequency[i - 1][1]
+            and by_frequency[i][0] - by_frequency[i - 1][0] <= REPEATED * by_frequency[i][0]
+        ):
+            by_frequency[i - 1], by_frequency[i] = by_frequency[i], by_frequency[i - 1]
+    for k, (_, _, members, shape) in enumerate(by_frequency[:modes]):
+        T[members, interface + k] = shape
     return T
 
 
 def _node_order(n: int, held: np.ndarray) -> list[int]:
-    """Places of the node-wise coordinates among the families' ones: held nodes, other nodes, middles of elements.
+    """The order that puts coordinates of families node by node: held nodes, other nodes, then middles of elements.
+    Number i of the list is the index that coordinate i has among the families'.
 
+    n     number of nodes without the base, and of elements;   held (k,)  indices of nodes that are stations
     Families: y and its slope, z and rotation, along and its bubble, twist and its bubble, n of each.
     """
     y, slope_y, z, turn_y, along, bubble, twist, bubble_twist = (n * i for i in range(8))
@@ -229,20 +244,23 @@ def _node_order(n: int, held: np.ndarray) -> list[int]:
 
 
 def _orthonormal(strain: Floats, weights: Floats) -> Floats:
-    """Combinations T (k, n) of strains (q, k) that are orthonormal in energy: modes as they are, and of each
-    further column what those before lack. A column of which they lack next to nothing is left out."""
-    root = np.sqrt(weights)[:, None] * strain
-    length = np.linalg.norm(root, axis=0)
-    rows, basis = root / length, np.zeros((len(root), 0))
-    T = np.zeros((root.shape[1], 0))
-    for j in range(root.shape[1]):
-        rest, combination = rows[:, j], np.eye(root.shape[1])[j] / length
+    """Combinations T (k, n) of k functions, n <= k, whose strains are orthonormal in energy: each function less
+    what those before it span, scaled. A function of which they lack next to nothing is left out.
+
+    strain  (q, k)  of each function at Gauss points of weights (q,)
+    """
+    weighted = np.sqrt(weights)[:, None] * strain
+    length = np.linalg.norm(weighted, axis=0)
+    unit_columns, basis = weighted / length, np.zeros((len(weighted), 0))
+    T = np.zeros((weighted.shape[1], 0))
+    for j in range(weighted.shape[1]):
+        outside, combination = unit_columns[:, j], np.eye(weighted.shape[1])[j] / length
         for _ in range(2):  # Gram and Schmidt's projection leaves rounding, which a second one takes
-            share = basis.T @ rest
-            rest, combination = rest - basis @ share, combination - T @ share
-        size = float(np.linalg.norm(rest))
+            share = basis.T @ outside
+            outside, combination = outside - basis @ share, combination - T @ share
+        size = float(np.linalg.norm(outside))
         if size > DEPENDENT:
-            basis, T = np.column_stack([basis, rest / size]), np.column_stack([T, combination / size])
+            basis, T = np.column_stack([basis, outside / size]), np.column_stack([T, combination / size])
     return T
 
 
@@ -256,7 +274,11 @@ def _divided(edges: Floats, longest: float) -> Floats:
 
 
 def _stations(beam: BeamProperties, stations: ArrayLike) -> Floats:
-    """Stations (S,), those next to the base, the tip or one before them moved there."""
+    """The stations as an array (S,) [m], each one that is within SAME_PLACE of the base, the tip or an earlier one
+    moved there.
+
+    Raises  ValueError  for what are no numbers, and for a station off the beam
+    """
     try:
         at = np.array(stations, dtype=np.float64)
     except (TypeError, ValueError):
@@ -278,7 +300,7 @@ def _stations(beam: BeamProperties, stations: ArrayLike) -> Floats:
 
 
 def _loaded(stations: Floats) -> Floats:
-    """Places (k,) [m] of the stations that the base does not hold, each once, ascending."""
+    """Places (k,) [m] of the stations (S,) beyond the base, which holds those at 0; each once, ascending."""
     return np.unique(stations[stations > 0.0])
 
 
@@ -314,47 +336,56 @@ def flexible_link(
     planar    (3,)  axis about which alone the link's inertia is known; None: all of it is
     Raises    BeamError  for a beam that is heavier than its link, or has more modes than its elements
     """
-    left, carried, rest = carried_body(mechanism, link, beam, planar)
-    places = _fixed_places(mechanism, link, carried if left else None)
+    carried_mass, carried_center, carried_inertia = carried_body(mechanism, link, beam, planar)
+    places = _fixed_places(mechanism, link, carried_center if carried_mass else None)
     stations = np.unique([min(max(x, 0.0), beam.length) for x in places])
     body = _body(mechanism, link, beam, method, modes, elements, stations)
     kept = 0 if method == "lumped" else modes
-    return FlexibleLink(link, beam, body, method, kept, damping_time, left, carried, rest)
+    return FlexibleLink(
+        link, beam, body, method, kept, damping_time, carried_mass, carried_center, carried_inertia
+    )
 
 
 def carried_body(
     mechanism: Mechanism, link: int, beam: BeamProperties, planar: Floats | None = None
 ) -> tuple[float, Floats, Floats]:
-    """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m²] of what a link has beside a beam; arguments and
-    errors are those of `flexible_body`."""
+    """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m²], about that centre, of what a link has beside a beam;
+    arguments and errors are those of `flexible_link`. Mass and centre are 0 where the beam weighs all of it."""
     links = mechanism.links
     mass, centre, inertia = (np.asarray(each)[link] for each in (links.mass, links.center_of_mass, links.inertia))
     L, m = beam.length, beam.mass_per_length * beam.length
-    left = float(mass) - m
-    if left < -POSSIBLE * m:
+    carried_mass = float(mass) - m
+    if carried_mass < -POSSIBLE * m:
         raise BeamError(
             links.names[link],
             "mass_kg",
             f"is {float(mass):.6g} kg, and the beam alone weighs {m:.6g} kg; give the mass of the whole link, or "
             "another section or material",
         )
-    carried = np.zeros(3)
-    if left > NOTHING * m:
-        carried = (mass * centre - m * np.array([L / 2.0, 0.0, 0.0])) / left
-    left = left if left > NOTHING * m else 0.0
-    own = np.diag([beam.torsional_inertia_per_length * L, m * L**2 / 12.0, m * L**2 / 12.0])
-    rest = inertia - own - m * _spread(np.array([L / 2.0, 0.0, 0.0]) - centre) - left * _spread(carried - centre)
+    carried_center = np.zeros(3)
+    if carried_mass > NOTHING * m:
+        carried_center = (mass * centre - m * np.array([L / 2.0, 0.0, 0.0])) / carried_mass
+    carried_mass = carried_mass if carried_mass > NOTHING * m else 0.0
+    beam_inertia = np.diag([beam.torsional_inertia_per_length * L, m * L**2 / 12.0, m * L**2 / 12.0])
+    carried_inertia = (
+        inertia
+        - beam_inertia
+        - m * _point_inertia(np.array([L / 2.0, 0.0, 0.0]) - centre)
+        - carried_mass * _point_inertia(carried_center - centre)
+    )
     if planar is not None:
-        rest = float(planar @ rest @ planar) * np.outer(planar, planar)
-    least = float(np.min(np.linalg.eigvalsh(rest)))
-    if least < -POSSIBLE * float(np.max(own)):
+        carried_inertia = float(planar @ carried_inertia @ planar) * np.outer(planar, planar)
+    # no axis may be left with a negative moment, but by rounded numbers
+    least = float(np.min(np.linalg.eigvalsh(carried_inertia)))
+    if least < -POSSIBLE * float(np.max(beam_inertia)):
         raise BeamError(
             links.names[link],
             "inertia_kg_m2",
-            f"leaves {least:.4g} kg m² for what the beam carries, whose own moment is {float(np.max(own)):.4g} "
-            "kg m² about its centre; give the inertia of the whole link, or another section or material",
+            f"leaves {least:.4g} kg m² for what the beam carries, whose own moment is "
+            f"{float(np.max(beam_inertia)):.4g} kg m² about its centre; give the inertia of the whole link, or "
+            "another section or material",
         )
-    return left, carried, rest
+    return carried_mass, carried_center, carried_inertia
 
 
 def _body(
@@ -380,7 +411,8 @@ def _body(
 
 
 def _fixed_places(mechanism: Mechanism, link: int, carried: Floats | None) -> list[float]:
-    """Places along a link [m] where other links, closures, the handle or its own body are fixed, and its tip."""
+    """Places along a link [m] where other links, closures, the handle or the body that it carries are fixed, and
+    its tip. carried (3,): that body's centre; None: there is none."""
     links, closures = mechanism.links, mechanism.closures
     places = [float(links.tip[link][0])]
     places += [float(links.origin[i][0]) for i in np.flatnonzero(np.asarray(links.parent) == link)]
@@ -392,6 +424,6 @@ def _fixed_places(mechanism: Mechanism, link: int, carried: Floats | None) -> li
     return places if carried is None else [*places, float(carried[0])]
 
 
-def _spread(arm: Floats) -> Floats:
-    """Inertia (3, 3) of a unit mass at an arm (3,)."""
+def _point_inertia(arm: Floats) -> Floats:
+    """Inertia (3, 3) about the origin of a point of unit mass at `arm` (3,): |r|^2 1 - r r^T."""
     return np.asarray(float(arm @ arm) * np.eye(3) - np.outer(arm, arm))

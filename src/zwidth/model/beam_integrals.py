@@ -8,6 +8,8 @@ Shape functions along a beam: vibration modes, static deflections and finite ele
 A family of n functions at q places is an array (d, q, n) of their values and first derivatives by s: d = 3 for
 bending (deflection, slope, curvature), d = 2 for stretch and twist (displacement or angle, strain). All functions
 and the slopes of bending are 0 at the base, s = 0, where the beam's frame sits.
+
+eps, a, k, c, w, r2, D2 and O2 are those of `flexible_body`; e is the number of elastic coordinates eps.
 """
 
 from __future__ import annotations
@@ -59,8 +61,9 @@ def gauss_panels(edges: Floats, order: int) -> Panels:
 
 
 def elastic_matrices(beam: BeamProperties, shapes: Shapes, weights: Floats) -> tuple[Floats, Floats]:
-    """Mass (e, e) with the base at rest, and stiffness (e, e), of shapes at Gauss points."""
+    """Mass (e, e) with the base at rest, and stiffness (e, e), of shapes at Gauss points of weights (q,) [m]."""
     (ux, uy, uz), (ax, _, _), (kx, ky, kz) = (np.moveaxis(field, 1, 0) for field in shapes[:3])
+    # displacement u, rotation a and curvature k, each (q, e) about or along x, y and z
     M = beam.mass_per_length * (_gram(ux, weights) + _gram(uy, weights) + _gram(uz, weights))
     M = M + beam.torsional_inertia_per_length * _gram(ax, weights)
     K = beam.EA * _gram(shapes.stretch, weights) + beam.GJ * _gram(kx, weights)
@@ -83,6 +86,7 @@ def body_of_shapes(
     e, L = len(K), beam.length
     mass = np.zeros((6 + e, 6 + e))
     mass[:6, :6] = rod_inertia(beam)
+    # momentum and moment of momentum of the moving line of centres, at each Gauss point
     line = beam.mass_per_length * weights[:, None, None] * shapes.displacement
     _, uy, uz = np.moveaxis(places[:, None, None] * line, 1, 0).sum(axis=1)
     mass[:3, 6:] = line.sum(axis=0)
@@ -101,7 +105,7 @@ def body_of_shapes(
 
 
 def second_order(shapes: Shapes, once: Floats, twice: Floats) -> tuple[Floats, Floats]:
-    """D2 (3, e, e) and O2 (3, e, e) of a station s: derivatives of 2 r2 and w by eps.
+    """D2 (3, e, e) and O2 (3, e, e) of a station s: second derivatives of r2 and of w/2 by eps.
 
     once, twice  (q,)  weights of the integral up to s, and of the integral up to s of the integral up to there,
                        which is that of (s - place) times the integrand
@@ -136,7 +140,8 @@ def rod_inertia(beam: BeamProperties) -> Floats:
 
 
 def _gram(one: Floats, weights: Floats, other: Floats | None = None) -> Floats:
-    """Sum over points of weight times one_i times other_j, (e, e)."""
+    """Sum over points of weight (q,) times one_i times other_j, (e, e), of functions (q, e); other None: one
+    again."""
     return np.asarray((one * weights[:, None]).T @ (one if other is None else other))
 
 
@@ -146,17 +151,20 @@ BOUNDARIES: Final = ("clamped", "clamped-pinned", "pinned")
 def assembled(in_y: Floats, in_z: Floats, along: Floats, twist: Floats) -> Shapes:
     """Shapes of four families: bending in the x-y and in the x-z plane, stretch and twist, in this order.
 
+    in_y, in_z, along, twist  (3, q, .) or (2, q, .)  values and derivatives, see the head of this file
     A deflection to z turns the beam about -y.
     """
     q = in_y.shape[1]
     sizes = [family.shape[2] for family in (in_y, in_z, along, twist)]
-    y, z, x, t = (slice(end - size, end) for end, size in zip(np.cumsum(sizes).tolist(), sizes, strict=True))
+    at_y, at_z, at_x, at_twist = (
+        slice(end - size, end) for end, size in zip(np.cumsum(sizes).tolist(), sizes, strict=True)
+    )
     displacement, rotation, curvature = (np.zeros((q, 3, sum(sizes))) for _ in range(3))
     stretch = np.zeros((q, sum(sizes)))
-    displacement[:, 1, y], rotation[:, 2, y], curvature[:, 2, y] = in_y
-    displacement[:, 2, z], rotation[:, 1, z], curvature[:, 1, z] = in_z[0], -in_z[1], -in_z[2]
-    displacement[:, 0, x], stretch[:, x] = along
-    rotation[:, 0, t], curvature[:, 0, t] = twist
+    displacement[:, 1, at_y], rotation[:, 2, at_y], curvature[:, 2, at_y] = in_y
+    displacement[:, 2, at_z], rotation[:, 1, at_z], curvature[:, 1, at_z] = in_z[0], -in_z[1], -in_z[2]
+    displacement[:, 0, at_x], stretch[:, at_x] = along
+    rotation[:, 0, at_twist], curvature[:, 0, at_twist] = twist
     return Shapes(displacement, rotation, curvature, stretch)
 
 
@@ -202,6 +210,9 @@ def bending_numbers(count: int, boundary: str) -> Floats:
 def _clamped_modes(x: Floats, b: Floats, sign: float) -> Floats:
     """cosh - cos - g (sinh - sin) of b x and its first two derivatives by x, (3, q, count).
 
+    x     (q, 1)    places in shares of the length;   b (count,)  `bending_numbers`
+    sign  1 for the tip that is free, -1 for the one that is pinned, in
+
         g = (cosh b + sign cos b) / (sinh b + sign sin b)
 
     The two growing functions are written as one that decays from the base and one that decays from the tip,
@@ -237,6 +248,7 @@ def bending_deflections(places: Floats, loaded: Floats) -> Floats:
     """Deflection of the clamped beam of unit stiffness under a force, then under a moment, at each of the loaded
     places (k,) > 0: (3, q, 2 k)."""
     s, c = places[:, None], loaded
+    # deflection, slope and curvature of each; up to the load the force's curvature is c - s, the moment's is 1
     t = np.minimum(s, c)  # beyond the load the beam is straight
     force = np.stack([t**2 * (3.0 * c - t) / 6.0 + c**2 / 2.0 * (s - t), t * (2.0 * c - t) / 2.0, c - t])
     moment = np.stack([t**2 / 2.0 + c * (s - t), t, np.where(s < c, 1.0, 0.0)])
@@ -245,7 +257,7 @@ def bending_deflections(places: Floats, loaded: Floats) -> Floats:
 
 def bar_deflections(places: Floats, loaded: Floats) -> Floats:
     """Stretch of the clamped bar of unit stiffness under a force, or its twist under a torque, at each of the
-    loaded places (k,) > 0: (2, q, k)."""
+    loaded places (k,) > 0, and its derivative: (2, q, k)."""
     s = places[:, None]
     return np.stack([np.minimum(s, loaded), np.where(s < loaded, 1.0, 0.0)])
 
@@ -256,11 +268,13 @@ def bar_deflections(places: Floats, loaded: Floats) -> Floats:
 def hermite_bending(places: Floats, nodes: Floats) -> Floats:
     """Cubic elements between ascending nodes (n+1,), the first of them clamped: deflections of the others, then
     their slopes, (3, q, 2 n)."""
-    element, x, h = _local(places, nodes)
+    element, x, h = _place_in_element(places, nodes)
+    # Hermite's cubics of a unit deflection or slope at either end of an element, with both derivatives by s
     start = np.stack([(1.0 - x) ** 2 * (1.0 + 2.0 * x), -6.0 * x * (1.0 - x) / h, (12.0 * x - 6.0) / h**2])
     end = np.stack([x**2 * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / h, (6.0 - 12.0 * x) / h**2])
     slope_start = np.stack([h * x * (1.0 - x) ** 2, (1.0 - x) * (1.0 - 3.0 * x), (6.0 * x - 4.0) / h])
     slope_end = np.stack([h * x**2 * (x - 1.0), x * (3.0 * x - 2.0), (6.0 * x - 2.0) / h])
+    # node 0 is clamped and has no columns, so that those of an element's end have its number
     n, q, inner = len(nodes) - 1, np.arange(len(places)), np.flatnonzero(element > 0)
     family = np.zeros((3, len(places), 2 * n))
     family[:, q, element], family[:, q, n + element] = end, slope_end
@@ -272,7 +286,7 @@ def hermite_bending(places: Floats, nodes: Floats) -> Floats:
 def quadratic_bar(places: Floats, nodes: Floats) -> Floats:
     """Quadratic elements, the first node held: values at the other nodes, then the height of a bubble 4 x (1 - x)
     within each element, which is 0 at the nodes, (2, q, 2 n)."""
-    element, x, h = _local(places, nodes)
+    element, x, h = _place_in_element(places, nodes)
     n, q, inner = len(nodes) - 1, np.arange(len(places)), np.flatnonzero(element > 0)
     family = np.zeros((2, len(places), 2 * n))
     family[:, q, element] = np.stack([x, 1.0 / h])
@@ -281,8 +295,9 @@ def quadratic_bar(places: Floats, nodes: Floats) -> Floats:
     return family
 
 
-def _local(places: Floats, nodes: Floats) -> tuple[Ints, Floats, Floats]:
-    """Element of each place, where it is between the element's ends (0 to 1), and the element's length."""
+def _place_in_element(places: Floats, nodes: Floats) -> tuple[Ints, Floats, Floats]:
+    """Of each place (q,): index of its element, share of the element's length that lies before it, and that
+    length."""
     element = np.clip(np.searchsorted(nodes, places, side="right") - 1, 0, len(nodes) - 2)
     h = np.diff(nodes)[element]
     return element, (places - nodes[element]) / h, h

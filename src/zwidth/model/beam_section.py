@@ -242,7 +242,10 @@ def beam_properties(length: float, section: CrossSection, material: Material) ->
 
 
 def _check_wall(wall: float, across: float, across_name: str, solid: str) -> None:
-    """Raise ValueError unless a wall thickness is above 0 and at most half of what is across."""
+    """Raise ValueError unless a wall thickness is above 0 and at most half of the outer size `across` [m].
+
+    across_name, solid  its name, and the call for a solid section, for the message
+    """
     check_number("wall", wall, "m", above=0.0)
     if wall > 0.5 * across * (1.0 + ROUNDING):
         raise ValueError(

@@ -1,4 +1,8 @@
-"""Forces of velocity and gravity in the independent coordinates, compiled and without allocation."""
+"""Forces of velocity and gravity in the independent coordinates, compiled and without allocation.
+
+q are all joint coordinates, p the c independent ones, B = dq/dp. Shapes have the letters of `MechanismArrays`;
+`gaps` and the like are the fields of `WorkingMemory`.
+"""
 
 from __future__ import annotations
 
@@ -43,13 +47,15 @@ def fill_accelerations(
 ) -> None:
     """Fill velocities and accelerations from the rates and their derivatives, parents first.
 
+    With p the parent of link i, o_i, z_i its joint's origin and axis:
+
     w_i = w_p + z_i q',   alpha_i = alpha_p + z_i q'' + w_p x z_i q',
     a_i = a_p + alpha_p x r + w_p x (w_p x r),   r = o_i - o_p;   the base falls upwards, a = -gravity
 
     A prismatic joint adds z_i q'' + 2 w_p x z_i q' to a_i instead. The three rates of a ball joint are one angular
     velocity about axes that turn with the link: w_p is that of the link that carries the joint, for each of them.
     """
-    w, alpha, a, rates, turning = (
+    w, alpha, a, rates, joint_accelerations = (
         flow.angular_velocity,
         flow.angular_acceleration,
         flow.acceleration,
@@ -62,8 +68,8 @@ def fill_accelerations(
         p, u = parent[i], column[i]
         rate, change = 0.0, 0.0
         if u >= 0:
-            rate, change = rates[u], turning[u]
-        slide, slip = 0.0, 0.0
+            rate, change = rates[u], joint_accelerations[u]
+        slide, slip = 0.0, 0.0  # q' and q'' of a prismatic joint
         if kind[i] == PRISMATIC:
             rate, change, slide, slip = 0.0, 0.0, rate, change
         zx, zy, zz = z[i, 0], z[i, 1], z[i, 2]
@@ -73,7 +79,7 @@ def fill_accelerations(
             a[i, 0], a[i, 1], a[i, 2] = slip * zx - gx, slip * zy - gy, slip * zz - gz
             continue
         wx, wy, wz = w[p, 0], w[p, 1], w[p, 2]
-        bx, by, bz = alpha[p, 0], alpha[p, 1], alpha[p, 2]
+        bx, by, bz = alpha[p, 0], alpha[p, 1], alpha[p, 2]  # alpha of the parent
         rx, ry, rz = o[i, 0] - o[p, 0], o[i, 1] - o[p, 1], o[i, 2] - o[p, 2]
         # w x (w x r) = w (w . r) - r (w . w)
         along, square = wx * rx + wy * ry + wz * rz, wx * wx + wy * wy + wz * wz
@@ -84,7 +90,7 @@ def fill_accelerations(
             a[i, 0] += slip * zx + 2.0 * slide * (wy * zz - wz * zy)
             a[i, 1] += slip * zy + 2.0 * slide * (wz * zx - wx * zz)
             a[i, 2] += slip * zz + 2.0 * slide * (wx * zy - wy * zx)
-        cx, cy, cz = 0.0, 0.0, 0.0
+        cx, cy, cz = 0.0, 0.0, 0.0  # angular velocity of the link that carries the joint
         if carrier[i] >= 0:
             cx, cy, cz = w[carrier[i], 0], w[carrier[i], 1], w[carrier[i], 2]
         alpha[i, 0] = bx + change * zx + rate * (cy * zz - cz * zy)
@@ -103,13 +109,14 @@ def point_acceleration(
     design: int,
     index: int,
 ) -> tuple[float, float, float]:
-    """Acceleration of the link's point local[design, index], less gravity [m/s²]."""
+    """Acceleration of the point local[design, index] (3,) of the link's frame, less gravity, in the base frame
+    [m/s²]; link -1 is the base."""
     if link < 0:
         return -gravity[0], -gravity[1], -gravity[2]
-    w, b, a, o = flow.angular_velocity, flow.angular_acceleration, flow.acceleration, work.origin
+    w, alpha, a, o = flow.angular_velocity, flow.angular_acceleration, flow.acceleration, work.origin
     p = link_point(work.rotation, o, link, local, design, index)
     wx, wy, wz = w[link, 0], w[link, 1], w[link, 2]
-    bx, by, bz = b[link, 0], b[link, 1], b[link, 2]
+    bx, by, bz = alpha[link, 0], alpha[link, 1], alpha[link, 2]
     rx, ry, rz = p[0] - o[link, 0], p[1] - o[link, 1], p[2] - o[link, 2]
     along, square = wx * rx + wy * ry + wz * rz, wx * wx + wy * wy + wz * wz
     # a + alpha x r + w x (w x r), the last as w (w . r) - r w^2
@@ -127,8 +134,9 @@ def closing_accelerations(
     """Fill the closures' rows of `gaps` with what the joints' accelerations must make up for.
 
     point  a_b - a_a;   frame  alpha_b - alpha_a, times the size
-    axis   s w_a x z + P (alpha_b - alpha_a), times the size: with z the common axis and P = 1 - z z^T, as the link
-           turns by s about an axis that itself turns, alpha_a - alpha_b = s' z + s w_a x z
+    axis   s w_a x z + P (alpha_b - alpha_a), times the size: with z the common axis and P = 1 - z z^T, as
+           link a turns against b by s = z . (w_a - w_b) about an axis that itself turns, alpha_a - alpha_b = s' z
+           + s w_a x z
     """
     gaps, R, size, w, alpha = (
         work.gaps,
@@ -145,6 +153,7 @@ def closing_accelerations(
             gaps[r + x] = pb[x] - pa[x]
         if mech.closing[c] == POINT:
             continue
+        # turn: w_a x z; both stay 0 for a frame, whose rows then are alpha_b - alpha_a
         turn, z = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if mech.closing[c] == AXIS:
             z = link_vector(R, a, mech.axis_a, design, c)
@@ -182,31 +191,31 @@ def bias(
     A_p q_p'' = -(a_a - a_b); then every link's inertia force and moment is projected on the unit motions of the
     independent coordinates. Gravity is the base falling upwards.
     """
-    rates, turning, per_unit = flow.rates, flow.joint_accelerations, work.rates
+    rates, joint_accelerations, per_unit = flow.rates, flow.joint_accelerations, work.rates
     m, independent = rates.size, per_unit.shape[0]
     for u in range(m):
         total = 0.0
         for s in range(independent):
             total += independent_rates[s] * per_unit[s, u]
         rates[u] = total
-        turning[u] = 0.0
+        joint_accelerations[u] = 0.0
     # first with passive joints that do not accelerate: the closures then open by what these must make up for
     fill_accelerations(mech, work, gravity, flow)
     if mech.a.size > 0:
         closing_accelerations(mech, design, work, flow, gravity)
         closure_step(mech, work)
         for u in range(m - independent):
-            turning[u] = mech.unit[design, u] * work.solution[0, u]
+            joint_accelerations[u] = mech.unit[design, u] * work.solution[0, u]
         fill_accelerations(mech, work, gravity, flow)
-    _project(mech, design, work, flow, gravity, out)
+    _project_inertia_forces(mech, design, work, flow, gravity, out)
 
 
 @compiled_lean
-def _project(
+def _project_inertia_forces(
     mech: MechanismArrays, design: int, work: WorkingMemory, flow: LinkAccelerations, gravity: Floats, out: Floats
 ) -> None:
-    """Each link's inertia force m a and moment I alpha + w x I w on the unit motions of the independent
-    coordinates."""
+    """Fill `out` (c,): each link's inertia force f = m a and moment I alpha + w x I w on the unit motions of the
+    independent coordinates."""
     R, o, spin, speed = work.rotation, work.origin, work.spin, work.speed
     w, b = flow.angular_velocity, flow.angular_acceleration
     mass, center, I, k = mech.mass, mech.center_of_mass, mech.inertia, design
@@ -225,6 +234,7 @@ def _project(
         bx = R[i, 0, 0] * b[i, 0] + R[i, 1, 0] * b[i, 1] + R[i, 2, 0] * b[i, 2]
         by = R[i, 0, 1] * b[i, 0] + R[i, 1, 1] * b[i, 1] + R[i, 2, 1] * b[i, 2]
         bz = R[i, 0, 2] * b[i, 0] + R[i, 1, 2] * b[i, 1] + R[i, 2, 2] * b[i, 2]
+        # h = I w, then the moment about the centre of mass; t is that about the link's origin, in the base frame
         hx = I[k, i, 0, 0] * wx + I[k, i, 0, 1] * wy + I[k, i, 0, 2] * wz
         hy = I[k, i, 1, 0] * wx + I[k, i, 1, 1] * wy + I[k, i, 1, 2] * wz
         hz = I[k, i, 2, 0] * wx + I[k, i, 2, 1] * wy + I[k, i, 2, 2] * wz

@@ -7,7 +7,8 @@ workspace; where the equations agree (a closed loop, a goal within reach) the le
 one.
 
 Rows and gaps of rotations are angles times the mechanism's size, so that all are lengths. Unknowns are solved for
-in their units (`MechanismArrays.unit`), so that all are of the size of angles.
+in their units (`MechanismArrays.unit`), so that all are of the size of angles. `rows`, `gaps` and the like are the
+fields of `WorkingMemory`; design is the index of the design.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ Vector = tuple[float, float, float]
 
 @compiled_lean
 def chain_columns(mech: MechanismArrays, work: WorkingMemory, link: int, p: Vector, row: int, sign: float) -> None:
-    """Add sign * d(point p of the link)/dq_j to three rows for every unknown j between the base and the link:
-    z_j x (p - o_j), of a prismatic joint z_j."""
+    """Add sign * d(point p of the link)/dq_j to three rows of `work.rows`, from `row` on, for every unknown j
+    between the base and the link: z_j x (p - o_j), of a prismatic joint z_j."""
     parent, column, kind = mech.parent, mech.column, mech.kind
     axis, origin, rows = work.axis, work.origin, work.rows
     i = link
@@ -39,17 +40,17 @@ def chain_columns(mech: MechanismArrays, work: WorkingMemory, link: int, p: Vect
             for x in range(3):
                 rows[u, row + x] += sign * axis[i, x]
         elif u >= 0:
-            x, y, w = p[0] - origin[i, 0], p[1] - origin[i, 1], p[2] - origin[i, 2]
-            rows[u, row] += sign * (axis[i, 1] * w - axis[i, 2] * y)
-            rows[u, row + 1] += sign * (axis[i, 2] * x - axis[i, 0] * w)
-            rows[u, row + 2] += sign * (axis[i, 0] * y - axis[i, 1] * x)
+            rx, ry, rz = p[0] - origin[i, 0], p[1] - origin[i, 1], p[2] - origin[i, 2]
+            rows[u, row] += sign * (axis[i, 1] * rz - axis[i, 2] * ry)
+            rows[u, row + 1] += sign * (axis[i, 2] * rx - axis[i, 0] * rz)
+            rows[u, row + 2] += sign * (axis[i, 0] * ry - axis[i, 1] * rx)
         i = parent[i]
 
 
 @compiled_lean
 def chain_turns(mech: MechanismArrays, work: WorkingMemory, link: int, row: int, scale: float, a: Vector) -> None:
-    """Add scale times the link's angular velocity per unit rate of every unknown to three rows, without its part
-    along a, a unit vector or 0."""
+    """Add scale times the link's angular velocity per unit rate of every unknown to three rows of `work.rows`,
+    from `row` on, without its part along a, a unit vector or 0."""
     parent, column, kind, axis, rows = mech.parent, mech.column, mech.kind, work.axis, work.rows
     i = link
     while i >= 0:
@@ -63,7 +64,8 @@ def chain_turns(mech: MechanismArrays, work: WorkingMemory, link: int, row: int,
 
 @compiled_lean
 def equations(mech: MechanismArrays, design: int, work: WorkingMemory) -> None:
-    """Fill `rows` and `gaps` at the present place of the links: rows^T dq = gaps is Newton's step to the goal."""
+    """Fill `rows` and `gaps`, of closures and then handle, at the present place of the links: rows^T dq = gaps is
+    Newton's step to the goal."""
     R, o, rows, gaps = work.rotation, work.origin, work.rows, work.gaps
     a, b, point_a, point_b, first_row = mech.a, mech.b, mech.point_a, mech.point_b, mech.first_row
     for u in range(rows.shape[0]):
@@ -87,11 +89,12 @@ def closing_turn(mech: MechanismArrays, design: int, c: int, work: WorkingMemory
     frame stands to that of b as it should."""
     R, gaps, size, r = work.rotation, work.gaps, mech.size[design], mech.first_row[c] + 3
     a, b = mech.a[c], mech.b[c]
-    along = (0.0, 0.0, 0.0)
+    common_axis = (0.0, 0.0, 0.0)
     if mech.closing[c] == AXIS:
-        along = link_vector(R, a, mech.axis_a, design, c)
-        turn = vector_between_axes(along, link_vector(R, b, mech.axis_b, design, c))
+        common_axis = link_vector(R, a, mech.axis_a, design, c)
+        turn = vector_between_axes(common_axis, link_vector(R, b, mech.axis_b, design, c))
     else:
+        # A: the axes that b should have, by link a and the closure's rotation Q;   B: those that it has
         A, B, Q = work.turn, work.other, mech.closing_rotation
         for x in range(3):
             for y in range(3):
@@ -104,8 +107,8 @@ def closing_turn(mech: MechanismArrays, design: int, c: int, work: WorkingMemory
         turn = vector_between(A, B)
     for x in range(3):
         gaps[r + x] = size * turn[x]
-    chain_turns(mech, work, a, r, size, along)
-    chain_turns(mech, work, b, r, -size, along)
+    chain_turns(mech, work, a, r, size, common_axis)
+    chain_turns(mech, work, b, r, -size, common_axis)
 
 
 @compiled_lean
@@ -127,8 +130,9 @@ def _handle_equations(mech: MechanismArrays, design: int, r: int, work: WorkingM
 
 @compiled_inline
 def _row_range(spans: Ints, line: int, rows: int) -> tuple[Any, Any]:
-    """First row and end of a line, up to `rows`; without a sign, since compiled code checks each signed index for
-    one that counts from the end, which takes a third of the time of a least-squares solve."""
+    """First row and end, spans[line] (first, end), cut at `rows`; as unsigned numbers, since compiled code checks
+    each signed index for one that counts from the end, which takes a third of the time of a least-squares
+    solve."""
     end = max(0, min(spans[line, 1], rows))
     return np.uint64(min(spans[line, 0], end)), np.uint64(end)
 
@@ -137,7 +141,7 @@ def _row_range(spans: Ints, line: int, rows: int) -> tuple[Any, Any]:
 def least_squares(
     Q: Floats, R: Floats, b: Floats, x: Floats, spans: Ints, unknowns: int, rows: int, sides: int
 ) -> float:
-    """Minimise |Q^T x_s - b_s| for each of the first right-hand sides s, by modified Gram-Schmidt.
+    """Minimise |Q^T x_s - b_s| for each of the first `sides` right-hand sides s, by modified Gram-Schmidt.
 
     spans (m, 2)  first row and end of the rows of each line of Q that are not 0, also after lines before it are
                   taken away; beyond `rows` they do not count
@@ -149,17 +153,17 @@ def least_squares(
     """
     shortest, longest = np.inf, 0.0
     for j in range(unknowns):
-        left, taken = 0.0, 0.0
+        remaining, taken = 0.0, 0.0
         first, end = _row_range(spans, j, rows)
         for r in range(first, end):
-            left += Q[j, r] * Q[j, r]
+            remaining += Q[j, r] * Q[j, r]
         for i in range(j):
             # with what columns before have taken away, this is the column's original length
             taken += R[i, j] * R[i, j] * R[i, i]
-        shortest, longest = min(shortest, left), max(longest, left + taken)
+        shortest, longest = min(shortest, remaining), max(longest, remaining + taken)
         # a column that is spanned already takes no part; the returned condition is 0 then
-        scale = 1.0 / left if left > 0.0 else 0.0
-        R[j, j] = left
+        scale = 1.0 / remaining if remaining > 0.0 else 0.0
+        R[j, j] = remaining
         for i in range(j + 1, unknowns):
             part = 0.0
             for r in range(first, end):
@@ -207,7 +211,7 @@ def newton_step(mech: MechanismArrays, design: int, work: WorkingMemory) -> floa
 
 @compiled_lean
 def apply_step(mech: MechanismArrays, design: int, angles: Floats, work: WorkingMemory) -> None:
-    """Add the step in `work.solution[0]`, which is in the unknowns' units, to the joint coordinates."""
+    """Add the step in `work.solution[0]`, which is in the unknowns' units, to joint coordinates angles (n,)."""
     step = work.solution[0]
     for u in range(step.size):
         step[u] *= mech.unit[design, u]
@@ -250,8 +254,9 @@ def passive_rates(mech: MechanismArrays, design: int, work: WorkingMemory) -> fl
 
 @compiled_lean
 def _rates_per_drive(mech: MechanismArrays, design: int, work: WorkingMemory) -> None:
-    """Turn rates per independent joint into those per drive and free joint."""
-    rates, before, G = work.rates, work.solution, mech.to_joint
+    """Turn `rates` per coordinate of the independent joints into those per coordinate of the drives and free
+    joints."""
+    rates, before, G = work.rates, work.solution, mech.to_joint  # joint t moves by G[t, s] per coordinate s
     for s in range(rates.shape[0]):
         for u in range(rates.shape[1]):
             before[s, u] = rates[s, u]
@@ -264,16 +269,16 @@ def _rates_per_drive(mech: MechanismArrays, design: int, work: WorkingMemory) ->
 
 @compiled_lean
 def closure_step(mech: MechanismArrays, work: WorkingMemory) -> float:
-    """Step of the passive unknowns alone that closes the loops, in their units, from the basis `passive_rates`
-    left; its largest part."""
+    """Step of the passive unknowns alone that closes the loops, in their units, in `work.solution[0]`, from the
+    basis that `passive_rates` left there. Returned is its largest part; see `step_again`."""
     passive = mech.joint.size - work.rates.shape[0]
     return step_again(mech, work, passive, mech.first_row[mech.a.size])
 
 
 @compiled_lean
 def step_again(mech: MechanismArrays, work: WorkingMemory, unknowns: int, rows: int) -> float:
-    """Step of the first unknowns, in their units, for the present gaps in the first `rows` equations, by the
-    factors of the last least-squares solve of these; its largest part.
+    """Step of the first unknowns, in their units, in `work.solution[0]`, for the present gaps in the first `rows`
+    equations, by the factors of the last least-squares solve of these. Returned is its largest part, or nan.
 
     The orthogonal basis and the triangle still stand, so that only the new right-hand side is worked through.
     """
@@ -303,6 +308,7 @@ def orientation(start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: i
     """det(start^T rows) over the first unknowns and `count` equations, G (m, m) being scratch: it changes
     sign across a singularity.
 
+    start, rows (m, r)  equations' derivatives, a line for each unknown, before a step and after it
     spans (m, 2)  first row and end of the rows of each line that are not 0
 
     For square systems it is the product of the two determinants; products of rectangular ones stay positive
@@ -340,7 +346,7 @@ def orientations(mech: MechanismArrays, work: WorkingMemory) -> tuple[float, flo
 def _add_products(
     start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: int, first_row: int, end_row: int
 ) -> None:
-    """Add start^T rows over the equations from first_row to end_row - 1 to G."""
+    """Add start^T rows (see `orientation`) over the equations from first_row to end_row - 1 to G (m, m)."""
     for i in range(unknowns):
         low, high = max(spans[i, 0], first_row), min(spans[i, 1], end_row)
         if low >= high:

@@ -7,6 +7,9 @@ Nonlinear Problems*, sec. 5.1), where no joint turns far, and where neither the 
 a singularity; otherwise the step is halved.
 
 The posture of given drives and free joints: the loops closed again after they have moved, compiled.
+
+Shapes have the letters of `MechanismArrays`, goals g numbers, see `set_goal`. `rows`, `gaps`, `start` and the like
+are the fields of `WorkingMemory`.
 """
 
 from __future__ import annotations
@@ -82,15 +85,16 @@ def set_goal(mech: MechanismArrays, goals: Floats, i: int, work: WorkingMemory) 
 
 @compiled_lean
 def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float, work: WorkingMemory) -> float:
-    """Newton from `angles` (in place) to the goal; the last reciprocal condition, or -1 where it left the
-    branch.
+    """Newton from `angles` (in place) to `work.goal`. Returned is the last reciprocal condition, or -1 where it
+    left the branch: a correction that does not contract, joints that turn far, or a singularity passed.
 
-    tolerance  the error of the angles left [rad]: the next correction is judged from the last two
+    tolerance  largest error left in an unknown, in its unit: that after a correction of size s, smaller by the
+               ratio r than the one before, is about s r^2
     """
     gaps, solution = work.gaps, work.solution
     m, count = work.rows.shape[0], gaps.size
     rounding = ROUNDING * mech.size[design]
-    last, moved, condition = 0.0, 0.0, 0.0
+    last_size, moved, condition = 0.0, 0.0, 0.0
     for iteration in range(60):
         place_links(mech, design, angles, work)
         equations(mech, design, work)
@@ -100,11 +104,11 @@ def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float
         size = largest_magnitude(solution[0], m)
         moved += size
         settled = largest_magnitude(gaps, count) < rounding
-        if not settled and (not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last)):
+        if not settled and (not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last_size)):
             return -1.0
-        if not settled or size < last:
+        if not settled or size < last_size:
             apply_step(mech, design, angles, work)
-        ratio = size / last if last > 0.0 else 1.0
+        ratio = size / last_size if last_size > 0.0 else 1.0
         if settled or size * ratio * ratio < tolerance:
             break
         # what is left is about size ratio^2, of which a step by the same factors leaves a share of ratio^2; they
@@ -112,7 +116,7 @@ def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float
         regular = condition > FAR * (size + SINGULAR_CONDITION)
         if regular and size * ratio**4 < tolerance and _settles_again(mech, design, angles, size, tolerance, work):
             break
-        last = size
+        last_size = size
     place_links(mech, design, angles, work)
     equations(mech, design, work)
     # Newton may pass a singularity without slowing down: it knows nothing of the drives, and an arm that goes
@@ -164,7 +168,7 @@ def follow(
     """
     trial, n = work.trial, work.trial.size
     begin, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    done, step, condition = 0.0, 1.0, 1.0
+    done, step, condition = 0.0, 1.0, 1.0  # shares of the way: behind, and next
     while done < 1.0:
         step = min(step, 1.0 - done)
         # positions on the way need less accuracy than the target
@@ -260,6 +264,7 @@ def reference_batch(mech: MechanismArrays, goals: Floats, angles: Floats, gaps: 
         set_goal(mech, goals, i, work)
         equations(mech, i, work)
         keep_rows(work)
+        # with the handle at its goal; unless that is there without a singularity between, with the handle let go
         assemble(mech, i, True, present, work)
         held = _is_closed(mech, i, work, work.gaps.size)
         if held:
@@ -297,7 +302,7 @@ def _is_closed(mech: MechanismArrays, design: int, work: WorkingMemory, count: i
 
 @compiled_lean
 def _keep_posture(mech: MechanismArrays, work: WorkingMemory, angles: Floats, gaps: Floats) -> None:
-    """Copy the joint coordinates at hand to `angles` (n,), and how far each loop is open [m] to `gaps` (k,)."""
+    """Copy `work.angles` to `angles` (n,), and how far each loop is open [m] to `gaps` (k,)."""
     present, left, first = work.angles, work.gaps, mech.first_row
     for j in range(present.size):
         angles[j] = present[j]
@@ -310,7 +315,9 @@ def _keep_posture(mech: MechanismArrays, work: WorkingMemory, angles: Floats, ga
 
 @compiled_lean
 def assemble(mech: MechanismArrays, design: int, hold: bool, angles: Floats, work: WorkingMemory) -> None:
-    """Close one design's loops, by Levenberg-Marquardt; with `hold` the handle at the goal, too.
+    """Close one design's loops from rough joint coordinates angles (n,) (in place), by Levenberg-Marquardt.
+
+    hold  True: the handle is taken to `work.goal`, too; False: it goes where the loops have it
 
     The damping rows keep the step small while the start is rough, and let the handle go where it must when
     only the loops count.
@@ -379,28 +386,28 @@ def moved_posture(mech: MechanismArrays, angles: Floats, step: Floats) -> Floats
 
 @compiled
 def _move(mech: MechanismArrays, angles: Floats, step: Floats, parts: int) -> bool:
-    """Move the independent coordinates `parts` times by a step (c,), closing the loops (n,) in place; False where
-    they do not close."""
+    """Move the independent coordinates `parts` times by a step (c,) and close the loops, the joint coordinates
+    angles (n,) in place; False where they do not close."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
     passive_rates(mech, 0, work)
     passive, c = mech.joint.size - step.size, step.size
-    goal = np.zeros(c)
+    independent = np.zeros(c)
     for s in range(c):
         for t in range(c):
-            goal[s] += mech.to_drive[0, s, t] * angles[mech.joint[passive + t]]
+            independent[s] += mech.to_drive[0, s, t] * angles[mech.joint[passive + t]]
     for _ in range(parts):
-        goal += step
-        if close_at(mech, goal, angles, work) < 0.0:
+        independent += step
+        if close_at(mech, independent, angles, work) < 0.0:
             return False
     return True
 
 
 @compiled_lean
 def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: WorkingMemory) -> float:
-    """Move the independent joints to coordinates (c,) and close the loops, the joints' (links,) in place; their
-    reciprocal condition.
+    """Move the drives and free joints to their coordinates `independent` (c,) and close the loops, the joint
+    coordinates angles (n,) in place. Returned is the loops' reciprocal condition, or NOT_CLOSED.
 
     Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch.
     Links, `rows` and `rates` belong to the closed posture afterwards.
@@ -417,6 +424,7 @@ def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: W
         for s in range(c if u < passive else 0):
             step[u] += rates[s, u] * ahead[s]
     move_joints(mech, angles, step)
+    # exactly where they are wanted, without the rounding of the step
     for s in range(c):
         angles[joint[passive + s]] = 0.0
         for t in range(c):

@@ -45,14 +45,14 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
 
     operator  at the handle: one for all, or with numbers of N designs; None: nobody
     period    () or (N,)  at which they are sampled [s]: up to half that rate the pairs are held against the plants
-    Returns   nan as reach for a plant that is to be looked at alone: without modes; with a motion that nothing
-              holds or brakes though others move it; with poles that are nearly double
+    Returns   nan as reach for a plant that has to be computed by itself, otherwise: without modes; with a motion
+              that nothing holds or brakes though others move it; with poles that are nearly double
     """
-    M, B, K, ends, known = _matrices(modes, operator)
+    M, B, K, ends, known = _plant_matrices(modes, operator)
     reach = np.where(known, np.abs(ends).sum(axis=2).prod(axis=0), np.nan)
     free = _set_aside_free_motions(B, K, ends)
     N, n = ends.shape[1:]
-    companion = np.zeros((N, 2 * n, 2 * n))
+    companion = np.zeros((N, 2 * n, 2 * n))  # A of (x, x')' = A (x, x')
     companion[:, :n, n:] = np.eye(n)
     companion[:, n:, :n], companion[:, n:, n:] = -np.linalg.solve(M, K), -np.linalg.solve(M, B)
     poles = np.linalg.eigvals(companion).astype(np.complex128)
@@ -67,21 +67,27 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
     return pairs.with_free_motion(free) if free.any() else pairs
 
 
-def _matrices(modes: RenderedModes, operator: Operator | None) -> tuple[Floats, Floats, Floats, Floats, Flags]:
-    """M, B, K (N, n, n), input and output (2, N, n) of each plant, and whether it has modes (N,)."""
+def _plant_matrices(
+    modes: RenderedModes, operator: Operator | None
+) -> tuple[Floats, Floats, Floats, Floats, Flags]:
+    """M, B, K (N, n, n) of each plant; ends (2, N, n), its input and its output; and (N,) whether it has modes.
+
+    Where it has none, M and K are unit matrices and the rest is 0. The arm of an elastic grasp is the last
+    coordinate.
+    """
     N, m = modes.decay.shape
     elastic = operator is not None and not operator.rigid_grasp
     n = m + elastic
     M, B, K = (np.zeros((N, n, n)) for _ in range(3))
     ends = np.zeros((2, N, n))
     known: Flags = np.all(np.isfinite(modes.input + modes.output + modes.decay), axis=1)
-    at, here = np.arange(m), known[:, None]
-    M[:, at, at] = 1.0
-    K[:, at, at] = np.where(here, modes.frequency_squared, 1.0)
+    diagonal, known_column = np.arange(m), known[:, None]
+    M[:, diagonal, diagonal] = 1.0
+    K[:, diagonal, diagonal] = np.where(known_column, modes.frequency_squared, 1.0)
     if modes.drag is None:
-        B[:, at, at] = np.where(here, 2.0 * modes.decay, 0.0)
+        B[:, diagonal, diagonal] = np.where(known_column, 2.0 * modes.decay, 0.0)
     else:
-        B[:, :m, :m] = np.where(here[..., None], modes.drag, 0.0)
+        B[:, :m, :m] = np.where(known_column[..., None], modes.drag, 0.0)
     if operator is not None:
         known &= np.all(np.isfinite(modes.handle), axis=1)
         handle = np.where(known[:, None], modes.handle, 0.0)
@@ -104,17 +110,19 @@ def _matrices(modes: RenderedModes, operator: Operator | None) -> tuple[Floats, 
 
 
 def _set_aside_free_motions(B: Floats, K: Floats, ends: Floats) -> Floats:
-    """Take the motions without stiffness and damping, whose double pole at 0 is known, out of the matrices.
+    """Take the motions without stiffness and damping, whose double pole at 0 is known, out of the matrices (in
+    place).
 
-    In them they become springs of their own that nothing moves. Returns their shares in the reading (N,) [1/kg],
-    together.
+    Each gets a spring of its own instead, and neither input nor output, so that it has no part in the response.
+    Returns (N,) [1/kg] the sum over these motions of input times output: their response is this over s^2.
     """
-    at = np.arange(K.shape[1])
+    diagonal = np.arange(K.shape[1])
     free = ~(np.abs(K).max(axis=2) > 0.0) & ~(np.abs(B).max(axis=2) > 0.0)
     shares = np.where(free, ends[0] * ends[1], 0.0).sum(axis=1)
     stiffest = np.abs(K).max(axis=(1, 2), initial=0.0)
+    # stiffer than all others and each other, so that their poles meet none
     apart = 2.0 + 0.37 * np.cumsum(free, axis=1)
-    K[:, at, at] = np.where(free, apart * np.maximum(stiffest, 1.0)[:, None], K[:, at, at])
+    K[:, diagonal, diagonal] = np.where(free, apart * np.maximum(stiffest, 1.0)[:, None], K[:, diagonal, diagonal])
     ends[:, free] = 0.0
     return np.asarray(shares)
 
@@ -135,12 +143,16 @@ def _fill_pairs(
     first: int,
     last: int,
 ) -> None:
-    """Parts of plants first to last - 1, those with a finite reach; nan as reach of one that is left alone.
+    """Fill decay, squared, position and velocity (N, n), as of `PolePairs`, of plants first to last - 1.
 
-    ends  (2, N, n)  input and output
+    Those whose reach (N,) is not finite are passed over. Where a plant's poles are nearly double, or its parts do
+    not add up to its response, its reach is made nan.
+
+    ends     (2, N, n)  input and output;   poles (N, 2 n)  rough ones, of each plant
+    periods  (1,) or (N,)  sampling periods [s]
     """
     n = M.shape[1]
-    A, x, p, r = (
+    A, x, refined, residues = (
         np.empty((n, n), np.complex128),
         np.empty(n, np.complex128),
         np.empty(2 * n, np.complex128),
@@ -155,17 +167,17 @@ def _fill_pairs(
         for k in range(2 * n):
             # one of each conjugate pair tells of both
             if poles[i, k].imag >= 0.0:
-                p[count], r[count], sure = _pole_and_residue(
+                refined[count], residues[count], sure = _pole_and_residue(
                     M[i], B[i], K[i], ends[:, i], poles[i, k], largest, A, x
                 )
                 known = known and sure
                 count += 1
         parts = decay[i], squared[i], position[i], velocity[i]
-        known = known and _are_apart(p, count) and _join_poles(p, r, count, reach[i], *parts)
+        known = known and _are_apart(refined, count) and _join_poles(refined, residues, count, reach[i], *parts)
         if known:
-            _settle(M[i], ends[:, i], decay[i], position[i], velocity[i], A, x)
+            _correct_sums(M[i], ends[:, i], decay[i], position[i], velocity[i], A, x)
             highest = np.pi / periods[i if len(periods) > 1 else 0]
-            known = _add_up(M[i], B[i], K[i], ends[:, i], *parts, highest, A, x)
+            known = _agree_with_plant(M[i], B[i], K[i], ends[:, i], *parts, highest, A, x)
         if not known:
             reach[i] = np.nan
 
@@ -174,13 +186,15 @@ def _fill_pairs(
 def _pole_and_residue(
     M: Floats, B: Floats, K: Floats, ends: Floats, start: complex, largest: float, A: Complexes, x: Complexes
 ) -> tuple[complex, complex, bool]:
-    """A pole from close by, its residue, and whether it stands alone; A and x are working memory.
+    """The pole that is nearest to `start`, its residue, and whether it is surely a single pole; by inverse
+    iteration.
 
-    largest  size of the largest pole
+    ends     (2, n)  input and output;   largest  size of the largest pole
+    A, x     (n, n), (n,)  working memory: Q(p) and its eigenvector
     """
     n, p = len(x), complex(start)
     for k in range(n):
-        x[k] = complex(1.0 + 0.37 * k, 0.0)
+        x[k] = complex(1.0 + 0.37 * k, 0.0)  # across no eigenvector but by chance
     for _ in range(ITERATIONS):
         for a in range(n):
             for b in range(n):
@@ -191,7 +205,7 @@ def _pole_and_residue(
             length = max(length, abs(x[k].real) + abs(x[k].imag))
         for k in range(n):
             x[k] = complex(x[k].real / length, x[k].imag / length)
-        inertia, drag, spring = _form(M, x), _form(B, x), _form(K, x)
+        inertia, drag, spring = _quadratic_form(M, x), _quadratic_form(B, x), _quadratic_form(K, x)
         # the root of  inertia p^2 + drag p + spring  that is nearer to p; a real pole stays real
         half = -0.5 * drag / inertia
         root = np.sqrt(half * half - spring / inertia)
@@ -202,6 +216,7 @@ def _pole_and_residue(
         p = complex(nearer.real, nearer.imag if start.imag != 0.0 else 0.0)
         if abs(p) <= ZERO * largest:
             p = complex(0.0, 0.0)
+    # x^T Q'(p) x, and the sum of its terms' sizes: nearly 0 against that only at a double pole
     slope, size = 2.0 * p * inertia + drag, 0.0
     enter, leave = complex(0.0, 0.0), complex(0.0, 0.0)
     for a in range(n):
@@ -213,8 +228,8 @@ def _pole_and_residue(
 
 
 @compiled_lean
-def _form(matrix: Floats, x: Complexes) -> complex:
-    """x^T A x."""
+def _quadratic_form(matrix: Floats, x: Complexes) -> complex:
+    """x^T A x, of a real matrix A (n, n) and a complex x (n,), which is not conjugated."""
     total = complex(0.0, 0.0)
     for a in range(len(x)):
         row = complex(0.0, 0.0)
@@ -258,7 +273,7 @@ def solve(A: Complexes, x: Complexes) -> None:
 
 @compiled_lean
 def _are_apart(p: Complexes, count: int) -> bool:
-    """Whether no two of the poles are nearly one."""
+    """Whether no two of the first `count` poles p are nearly one."""
     for a in range(count):
         for b in range(a):
             if abs(p[a] - p[b]) <= SAME_POLE * max(abs(p[a]), abs(p[b])):
@@ -277,9 +292,11 @@ def _join_poles(
     position: Floats,
     velocity: Floats,
 ) -> bool:
-    """Parts of second order from poles with Im >= 0 and their residues; False where one is to be looked at alone.
+    """Fill one plant's parts of second order (n,) from `count` poles p with Im >= 0 and their residues r.
 
-    Parts that the force does not move or the sensor does not read are set to zero.
+    False where that cannot be: one part is hidden to all but rounding, or real poles do not come in pairs. Parts
+    that the force does not move or the sensor does not read are set to zero. Residues of real poles are
+    overwritten.
     """
     parts = 0
     for k in range(count):
@@ -296,7 +313,7 @@ def _join_poles(
                 return False
             parts += 1
     # real poles, the fastest first, two by two
-    waiting, waiting_residue, have = 0.0, 0.0, False
+    waiting, waiting_residue, waits = 0.0, 0.0, False
     for _ in range(count):
         best, at = -1.0, -1
         for k in range(count):
@@ -309,45 +326,47 @@ def _join_poles(
             return False
         pole, residue = p[at].real, r[at].real
         r[at] = complex(np.nan, 0.0)
-        if not have:
-            waiting, waiting_residue, have = pole, residue, True
+        if not waits:
+            waiting, waiting_residue, waits = pole, residue, True
             continue
         decay[parts], squared[parts] = -0.5 * (waiting + pole), waiting * pole
         velocity[parts] = waiting_residue + residue
         position[parts] = -(waiting_residue * pole + residue * waiting)
-        parts, have = parts + 1, False
-    return not have
+        parts, waits = parts + 1, False
+    return not waits
 
 
 @compiled_lean
-def _settle(
+def _correct_sums(
     M: Floats, ends: Floats, decay: Floats, position: Floats, velocity: Floats, A: Complexes, x: Complexes
 ) -> None:
-    """Correct the parts by what rounding has left of two sums that are known, which high frequencies hang on:
+    """Take what rounding has left of two sums that are known, which high frequencies hang on, off the parts (n,):
 
-    P(s) -> output M^-1 input / s^2  as s grows
+        P(s) -> output M^-1 input / s^2  as s grows
 
-    sum velocity = 0,       sum (position - 2 a velocity) = output M^-1 input
+        sum velocity = 0,       sum (position - 2 a velocity) = output M^-1 input
+
+    ends  (2, n)  input and output;   A (n, n), x (n,)  working memory
     """
-    n, sum_v, sum_x, at_v, at_x = len(x), 0.0, 0.0, 0, 0
+    n, velocity_excess, position_excess, largest_velocity, largest_position = len(x), 0.0, 0.0, 0, 0
     for a in range(n):
         x[a] = complex(ends[0, a], 0.0)
         for b in range(n):
             A[a, b] = complex(M[a, b], 0.0)
     solve(A, x)
     for k in range(n):
-        sum_v += velocity[k]
-        at_v = k if abs(velocity[k]) > abs(velocity[at_v]) else at_v
+        velocity_excess += velocity[k]
+        largest_velocity = k if abs(velocity[k]) > abs(velocity[largest_velocity]) else largest_velocity
     # taken off the largest, of which it is the smallest share
-    velocity[at_v] -= sum_v
+    velocity[largest_velocity] -= velocity_excess
     for k in range(n):
-        sum_x += position[k] - 2.0 * decay[k] * velocity[k] - ends[1, k] * x[k].real
-        at_x = k if abs(position[k]) > abs(position[at_x]) else at_x
-    position[at_x] -= sum_x
+        position_excess += position[k] - 2.0 * decay[k] * velocity[k] - ends[1, k] * x[k].real
+        largest_position = k if abs(position[k]) > abs(position[largest_position]) else largest_position
+    position[largest_position] -= position_excess
 
 
 @compiled_lean
-def _add_up(
+def _agree_with_plant(
     M: Floats,
     B: Floats,
     K: Floats,
@@ -360,7 +379,9 @@ def _add_up(
     A: Complexes,
     x: Complexes,
 ) -> bool:
-    """Whether the parts' responses add up to the plant's at some frequencies up to the highest [rad/s]."""
+    """Whether the parts' responses add up to the plant's at PROBES of the highest frequency [rad/s].
+
+    A, x  working memory"""
     n = len(x)
     for share in PROBES:
         s = complex(0.0, share * highest)

@@ -51,7 +51,7 @@ def change_designs(value: T, change: Change, shape: tuple[int, ...]) -> T:
 
 
 def differing_fields(owner: object, names: Sequence[str]) -> tuple[str, ...]:
-    """Which of an object's fields have axes of designs."""
+    """Which of an object's fields, by name, have axes of designs."""
     return tuple(name for name in names if design_shape(getattr(owner, name)))
 
 
@@ -61,12 +61,12 @@ def change_fields(owner: object, names: Sequence[str], change: Change, shape: tu
 
 
 def at_index(index: Any) -> Change:
-    """The change that takes one point, or several, by their leading axes."""
+    """The change that takes the designs at an index of the axes of designs, as numpy takes it."""
     return lambda array: np.asarray(array[index])
 
 
 def in_one_axis(count: int) -> Change:
-    """The change that puts so many leading axes into one."""
+    """The change that puts the first `count` axes into one."""
     return lambda array: array.reshape(-1, *array.shape[count:])
 
 
@@ -95,7 +95,7 @@ def _changed_numbers(numbers: Any, own: int, change: Change, shape: tuple[int, .
 
 
 def _arrays(value: Any) -> Iterator[tuple[NDArray[Any], int]]:
-    """Every array of designs in a dataclass, with the number of its own axes."""
+    """Every array that has axes of designs in a dataclass, or a tuple of such, with the number of its own axes."""
     if isinstance(value, tuple):
         for one in value:
             yield from _arrays(one)
@@ -114,7 +114,7 @@ def _fields(value: Any) -> Iterator[tuple[str, Any, int | None]]:
     kind = type(value)
     if kind not in _own_axes:
         hints = get_type_hints(kind, include_extras=True)
-        _own_axes[kind] = {one.name: _stated(hints[one.name]) for one in fields(value)}
+        _own_axes[kind] = {one.name: _own_axes_of_hint(hints[one.name]) for one in fields(value)}
     for name, own in _own_axes[kind].items():
         yield name, getattr(value, name), own
 
@@ -152,11 +152,12 @@ def join_designs(arrays: Sequence[Floats], own: int) -> Floats:
     return np.stack(full, axis=len(designs))
 
 
-def _stated(hint: Any) -> int | None:
-    """The axes that a field's type states, also inside `| None` and a dictionary's values."""
+def _own_axes_of_hint(hint: Any) -> int | None:
+    """The number of own axes that a field's type states, also inside `| None` and a dictionary's values; None
+    where it states none."""
     for part in get_args(hint):
         if isinstance(part, OwnAxes):
             return part.count
-        if (inner := _stated(part)) is not None:
+        if (inner := _own_axes_of_hint(part)) is not None:
             return inner
     return None

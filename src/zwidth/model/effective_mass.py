@@ -87,15 +87,19 @@ class DriveSide:
 
 
 def is_plain(mechanism: Mechanism) -> bool:
-    """Whether there is a drive for each coordinate and nothing else that acts on them: T = 1, t = h."""
+    """Whether there is a drive for each coordinate and nothing else that acts on them: T = 1, t = h.
+
+    Nothing else: no flexible links, free joints, springs, dampers or friction of joints, nor rotors whose turning
+    with their links counts.
+    """
     drives, links = mechanism.drives, mechanism.links
-    own = links.joint_stiffness, links.joint_damping, links.joint_coulomb
+    of_joints = links.joint_stiffness, links.joint_damping, links.joint_coulomb
     return not (
         mechanism.flexible
         or mechanism.free
         or drives.surplus
         or drives.motor_link is not None
-        or any(x is not None for x in own)
+        or any(x is not None for x in of_joints)
     )
 
 
@@ -112,8 +116,9 @@ def drive_side(mechanism: Mechanism, posture: Posture) -> DriveSide:
     rates, spins = np.full((len(design), c, n), np.nan), np.full((len(design), c, n, 3), np.nan)
     rotation = np.full((len(design), n, 3, 3), np.nan)
     known = np.flatnonzero(~np.isnan(angles).any(axis=1))
-    _motions(mech, design, angles, known, rates, spins, rotation)
+    _fill_rates(mech, design, angles, known, rates, spins, rotation)
     per_joint = np.swapaxes(rates, 1, 2)  # (N, n, c)
+    # a drive moves with its joint, and with those coupled to it
     T = per_joint[:, drives.joint]
     if drives.coupling is not None:
         T = T + per_design(mechanism, drives.coupling, 2)[design] @ np.nan_to_num(per_joint)
@@ -121,9 +126,9 @@ def drive_side(mechanism: Mechanism, posture: Posture) -> DriveSide:
     rubbing = np.flatnonzero(level.any(axis=0))
     return DriveSide(
         motion=T.reshape(*shape, d, c),
-        spin=_spin(mechanism, design, spins, rotation, shape),
-        stiffness=_of_joints(mechanism, links.joint_stiffness, per_joint, design, shape),
-        damping=_of_joints(mechanism, links.joint_damping, per_joint, design, shape),
+        spin=_motor_spin(mechanism, design, spins, rotation, shape),
+        stiffness=_sum_over_joints(mechanism, links.joint_stiffness, per_joint, design, shape),
+        damping=_sum_over_joints(mechanism, links.joint_damping, per_joint, design, shape),
         rubbing=per_joint[:, rubbing].reshape(*shape, len(rubbing), c),
         coulomb=np.broadcast_to(level, (int(design.max(initial=0)) + 1, n))[design][:, rubbing].reshape(
             *shape, -1
@@ -140,9 +145,9 @@ def drive_side_of_motions(mechanism: Mechanism, motions: Motions, angles: Floats
     """
     drives, links = mechanism.drives, mechanism.links
     T = DriveMotion.of(mechanism, motions, angles, np.asarray(drives.transmission)).T
-    none = np.zeros(len(links.names))
+    zeros = np.zeros(len(links.names))
     spring, damper, level = (
-        none if each is None else np.asarray(each)
+        zeros if each is None else np.asarray(each)
         for each in (links.joint_stiffness, links.joint_damping, links.joint_coulomb)
     )
     moving = [int(link) for link in motions.unknowns]
@@ -165,10 +170,14 @@ def drive_side_of_motions(mechanism: Mechanism, motions: Motions, angles: Floats
     )
 
 
-def _of_joints(
+def _sum_over_joints(
     mechanism: Mechanism, numbers: Floats | None, per_joint: Floats, design: Ints, shape: tuple[int, ...]
 ) -> Floats | None:
-    """sum_j k_j B_j^T B_j of the joints' numbers k, with B_j the rate of joint j, (..., c, c)."""
+    """sum_j k_j B_j^T B_j (..., c, c), with k the numbers (springs or dampers) of the joints and B_j the rate of
+    joint j; None for no numbers.
+
+    per_joint  (N, n, c)  rate of each joint per unit rate of each coordinate;   design (N,), shape (...) of N
+    """
     if numbers is None:
         return None
     k = per_design(mechanism, numbers, 1)[design]
@@ -177,10 +186,14 @@ def _of_joints(
     return np.asarray((np.swapaxes(B, 1, 2) @ (k[:, moving, None] * B)).reshape(*shape, B.shape[2], B.shape[2]))
 
 
-def _spin(
+def _motor_spin(
     mechanism: Mechanism, design: Ints, spins: Floats, rotation: Floats, shape: tuple[int, ...]
 ) -> Floats | None:
-    """S (..., d, c): angular velocity of each motor's link along its axis per unit rate."""
+    """S (..., d, c): angular velocity of each motor's link along its axis per unit rate; None if they do not
+    count.
+
+    spins (N, c, n, 3), rotation (N, n, 3, 3)  as `_fill_rates` fills them;   design (N,), shape (...) of N
+    """
     drives = mechanism.drives
     if drives.motor_link is None or drives.motor_axis is None:
         return None
@@ -188,13 +201,13 @@ def _spin(
     S = np.zeros((len(design), len(drives.names), spins.shape[1]))
     for i, link in enumerate(drives.motor_link):
         if link >= 0:
-            along = (rotation[:, link] @ axis[:, i, :, None])[..., 0]
-            S[:, i] = np.einsum("kcx,kx->kc", spins[:, :, link], along)
+            axis_in_base = (rotation[:, link] @ axis[:, i, :, None])[..., 0]
+            S[:, i] = np.einsum("kcx,kx->kc", spins[:, :, link], axis_in_base)
     return S.reshape(*shape, *S.shape[1:])
 
 
 @compiled
-def _motions(
+def _fill_rates(
     mech: MechanismArrays,
     design: Ints,
     angles: Floats,
@@ -203,8 +216,11 @@ def _motions(
     spins: Floats,
     rotation: Floats,
 ) -> None:
-    """Rates of the joints (N, c, n) and angular velocities of the links (N, c, n, 3) per unit rate of each
-    independent coordinate, and the links' axes (N, n, 3, 3), of the known postures."""
+    """Fill rates of the joints (N, c, n) and angular velocities `spins` of the links (N, c, n, 3) per unit rate of
+    each independent coordinate, and the links' axes `rotation` (N, n, 3, 3).
+
+    known  indices of the postures that are filled;   design (N,), angles (N, n)
+    """
     work = working_memory(mech)
     for k in range(known.size):
         i = known[k]
@@ -240,8 +256,8 @@ class DriveMotion:
                 table refer to
         """
         drives = mechanism.drives
-        each = [motions.joint(int(link)) for link in drives.joint]
-        T, Z = np.array([rate for rate, _ in each]), np.array([second for _, second in each])
+        joint_motions = [motions.joint(int(link)) for link in drives.joint]
+        T, Z = np.array([rate for rate, _ in joint_motions]), np.array([second for _, second in joint_motions])
         if drives.coupling is not None:
             for i, row in enumerate(np.asarray(drives.coupling).reshape(len(T), -1)):
                 for link in np.flatnonzero(row):
@@ -249,7 +265,8 @@ class DriveMotion:
                     T[i], Z[i] = T[i] + row[link] * rate, Z[i] + row[link] * second
         for i, table in enumerate(drives.ratio_tables or ()):
             if table is not None:
-                q, rate = angles[drives.joint[i]], each[i][0]
+                # its coordinate is f(q) / ratio with f' the ratio n(q) of the table
+                q, rate = angles[drives.joint[i]], joint_motions[i][0]
                 here, slope = float(table.at(q)) / ratio[i], float(table.slope(q)) / ratio[i]
                 T[i], Z[i] = here * T[i], here * Z[i] + slope * np.outer(rate, rate)
         return cls(T, Z)
@@ -292,7 +309,8 @@ def counted_posture(
 
         T^T (z(p) - z) = 0         dp/dz = (T^T T + sum_i r_i Z_i)^-1 T^T,   r = z(p) - z
 
-    With a drive for each coordinate r is 0. Free joints are taken to stand where they do.
+    z(p) being the drives' coordinates T p' integrates to, z those that are counted and Z_i the derivative of row i
+    of T. With a drive for each coordinate r is 0. Free joints are taken to stand where they do.
 
     start    motions of the device;   angles (n,)  its joint coordinates
     ahead    (d,)  by what the counted coordinates are ahead of those of its joints
@@ -345,8 +363,8 @@ def effective_parameters(mechanism: Mechanism, posture: Posture, direction: Arra
     """Effective masses and stiffness of a mechanism along a direction, or about an axis (then inertias [kg m²]
     and N m/rad).
 
-    With drives that are no coordinates of their own (`drive_side`): motor_side_mass 1 / (t^T M_theta^-1 t);
-    rigid_mass with M_phi + T^T M_theta T + C T + T^T C^T; stiffness 1 / (h^T (T^T K T)^-1 h) on the drives'
+    Where the drives are not the coordinates (`drive_side`): motor_side_mass 1 / (t^T M_theta^-1 t); rigid_mass
+    with M_phi + T^T M_theta T + C T + T^T C^T, C = S^T n J_m; stiffness 1 / (h^T (T^T K T)^-1 h) on the drives'
     coordinates.
 
     direction  (..., 3)  unit vectors in the base frame, broadcasting with the posture; or (..., 6), see `screw`
@@ -408,11 +426,16 @@ def _effective_in_general(
     spun: Floats | None,
     shape: tuple[int, ...],
 ) -> EffectiveParameters:
-    """Effective masses and stiffness where drives are not the coordinates: N postures, rotors and springs (N, d)
-    at the joints, spun (N, d) J_m n of rotors whose turning with their links counts."""
+    """Effective masses and stiffness where drives are not the coordinates, of N postures.
+
+    M, h           (N, c, c), (N, c)  mass matrix of the links, lever arms
+    rotor, spring  (N, d)  inertia n^2 J_m and stiffness n^2 k of each drive, at the joint
+    spun           (N, d)  n J_m of rotors whose turning with their links counts; None: it does not
+    shape          of the result, of N postures
+    """
     N, c = h.shape
     T = np.broadcast_to(side.motion, (*shape, *side.motion.shape[-2:])).reshape(N, -1, c)
-    t = side.shares(np.reshape(h, (*shape, c))).reshape(N, -1)
+    torque_shares = side.shares(np.reshape(h, (*shape, c))).reshape(N, -1)
     whole = M + np.swapaxes(T, 1, 2) @ (rotor[..., None] * T)
     if side.spin is not None and spun is not None:
         cross = np.swapaxes(T, 1, 2) @ (
@@ -420,10 +443,12 @@ def _effective_in_general(
         )
         whole = whole + cross + np.swapaxes(cross, 1, 2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        link, rigid = (1.0 / np.einsum("ki,ki->k", h, _solve(A, h)) for A in (M, whole))
-        motor = 1.0 / (t**2 / rotor).sum(axis=1)
+        link_mass, rigid_mass = (1.0 / np.einsum("ki,ki->k", h, _solve(A, h)) for A in (M, whole))
+        motor_mass = 1.0 / (torque_shares**2 / rotor).sum(axis=1)
         stiffness = 1.0 / _compliance(T[..., : side.driven], spring, h[:, : side.driven])
-    return EffectiveParameters(*(np.asarray(x).reshape(shape) for x in (link, motor, rigid, stiffness)))
+    return EffectiveParameters(
+        *(np.asarray(x).reshape(shape) for x in (link_mass, motor_mass, rigid_mass, stiffness))
+    )
 
 
 def _stiffness_with_links(mechanism: Mechanism, posture: Posture, screws: Floats) -> Floats:
@@ -438,6 +463,7 @@ def _stiffness_with_links(mechanism: Mechanism, posture: Posture, screws: Floats
         posed = at_postures(mechanism, one)
         motions = Motions(pack(posed), one.angles, posed.flexible)
         side, drives = drive_side_of_motions(posed, motions, one.angles), posed.drives
+        # what moves as the motors are held: the drives' coordinates and the elastic ones, but no free joint
         held = np.r_[0 : side.driven, motions.joint_count : motions.count]
         T, h = side.motion[:, held], motions.handle_along(screws[index])[held]
         spring = drives.transmission**2 * drives.stiffness
@@ -456,7 +482,8 @@ def _solve(A: Floats, h: Floats) -> Floats:
 
 
 def _compliance(T: Floats, spring: Floats, h: Floats, bending: Floats | None = None) -> Floats:
-    """h^T (T^T K T)^-1 h (N,) with rigid drives in the limit: they leave the motions N of T_r N = 0.
+    """h^T (T^T K T)^-1 h (N,) of T (N, d, c), h (N, c) and K the drives' springs (N, d), inf of rigid drives.
+    These are the limit: they leave the motions Y of T_r Y = 0, T_r being their rows of T.
 
     bending  (c, c)  stiffness of the links, which is added
     """
@@ -507,22 +534,26 @@ def inverse_form(A: Floats, h: Floats, d: int) -> float:
 
 @compiled
 def _effective_batch(design: Ints, M: Floats, along: Floats, rotor: Floats, spring: Floats, out: Floats) -> None:
-    """The four numbers of `EffectiveParameters` for each posture, of lever arms (N, d), out (4, N)."""
+    """Fill out (4, N), the four numbers of `EffectiveParameters` in their order, for each posture.
+
+    M, along       (N, d, d), (N, d)  mass matrix of the links, lever arms h
+    rotor, spring  (P, d)  of each design;   design (N,)  of each posture
+    """
     d = rotor.shape[1]
-    left, A = np.zeros(d), np.zeros((d, d))
+    lever_arms, A = np.zeros(d), np.zeros((d, d))
     for i in range(design.size):
         p = design[i]
         motor, compliance = 0.0, 0.0
         for s in range(d):
             motor += along[i, s] * along[i, s] / rotor[p, s]
             compliance += along[i, s] * along[i, s] / spring[p, s]
-        for both in range(2):
+        for both in range(2):  # 0: the links alone, 1: with the rotors; rows 0 and 2 of `out`
             for s in range(d):
-                left[s] = along[i, s]
+                lever_arms[s] = along[i, s]
                 for t in range(d):
                     A[s, t] = M[i, s, t]
                 if both == 1:
                     A[s, s] += rotor[p, s]
-            out[2 * both, i] = 1.0 / inverse_form(A, left, d)
+            out[2 * both, i] = 1.0 / inverse_form(A, lever_arms, d)
         out[1, i] = 1.0 / motor
         out[3, i] = 1.0 / compliance

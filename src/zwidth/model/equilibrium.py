@@ -85,13 +85,13 @@ class Equilibrium:
     @property
     def sideways_force(self) -> Floats:
         """The part (3,) of the hand's force, or about an axis of its moment, across the rendered direction."""
-        own, along = (
+        hand, along = (
             (self.hand_force, self.screw[:3]) if np.any(self.screw[:3]) else (self.hand_moment, self.screw[3:])
         )
-        return np.asarray(own - (own @ along) / (along @ along) * along)
+        return np.asarray(hand - (hand @ along) / (along @ along) * along)
 
     def one_sided_amplitude(self, wall_stiffness: float) -> float:
-        """Amplitude of the reading up to which a vibration stays within a one-sided wall: F/K [m]."""
+        """Amplitude of the reading up to which a vibration stays in a one-sided wall, F/K [m]; nan without one."""
         return abs(self.wall_force) / wall_stiffness if wall_stiffness > 0.0 else float("nan")
 
     def document(self, drives: Sequence[str]) -> dict[str, Any]:
@@ -115,14 +115,16 @@ class Equilibrium:
 
 
 def command_of(counted: CountedPosture, screw: Floats, weight: Floats, wall_force: float) -> tuple[Floats, Floats]:
-    """Motor torques (d,) that the computer asks for, and their part per unit of the wall's force.
+    """What the computer asks for where it counts the posture: motor torques at the joints (d,), and their part per
+    newton of the wall's force (d,).
 
-    weight  (c,) generalised forces of gravity as it computes them, which it compensates
+    screw   (6,)  the rendered direction
+    weight  (c,)  generalised forces of gravity as it computes them, which it compensates
     """
     k = counted.seen.shape[0]
-    share = np.linalg.pinv(counted.drives.T[:, :k].T)
-    unit = share @ counted.motions.handle_along(screw)[:k]
-    return wall_force * unit - share @ weight[:k], unit
+    share = np.linalg.pinv(counted.drives.T[:, :k].T)  # torques of the drives per generalised force
+    per_newton = share @ counted.motions.handle_along(screw)[:k]
+    return wall_force * per_newton - share @ weight[:k], per_newton
 
 
 def solve_equilibrium(
@@ -132,7 +134,7 @@ def solve_equilibrium(
 
     mechanism  with the ratios of drives with tables looked up at the posture, and their tables
     posture    of the links, a single one. Springs of free joints are at rest where the assembly has these joints
-    screw      (6,)  the rendered direction (`effective_parameters.screw`)
+    screw      (6,)  the rendered direction (`effective_mass.screw`)
     counts_motors  whether the encoders are on the motors, or on the links behind the drives
     Raises     EquilibriumError  where nothing balances a joint, or drives and their springs cannot hold the load
                LoadError         for a load that does not push along the direction
@@ -174,7 +176,11 @@ class Balance:
         return self.motions.joint_count
 
     def _bend(self, bending: Floats, share: float) -> None:
-        """Set what acts on the joints under a share of the load, the flexible links bent by coordinates (x,)."""
+        """Set what acts on the joints under a share of the load, the flexible links bent by coordinates (x,).
+
+        Set are speed and spin (3, n) of the handle per unit rate, the generalised forces `pull` (n,) of gravity,
+        the drives' motion (d, n) and `to_wrench` (`_wrench_of_torques`).
+        """
         n, handle = self.joints, self.motions.handle
         self.bending = bending
         self.speed = handle.speed[:, :n] + handle.speed_2[:, :n, n:] @ bending
@@ -188,10 +194,11 @@ class Balance:
         no lever arm, its own are rounding."""
         mech = self.motions.mech
         weight = float(np.linalg.norm(self.gravity) * np.sum(mech.mass[0]))
+        # with a lever arm of the mechanism's size: N m, over the unit of what slides N
         return np.asarray(weight * mech.size[0] / mech.unit[0, len(mech.joint) - self.joints :])
 
     def _free_springs(self, rest: Floats) -> Floats:
-        """Torques (c,) of the free joints' own springs."""
+        """Torques (c,) of the free joints' own springs, which are at rest at joint coordinates `rest` (n,)."""
         torques, stiffness = np.zeros(self.joints), self.mechanism.links.joint_stiffness
         for i, link in enumerate(self.mechanism.free if stiffness is not None else ()):
             assert stiffness is not None
@@ -207,6 +214,7 @@ class Balance:
         if self.mechanism.controls == ORIENTATION:
             rows[3:] = np.linalg.pinv(self.spin.T)
         elif self.mechanism.controls != POSITION:
+            # least in force and moment over the mechanism's size
             size = float(self.motions.mech.size[0])
             both = np.concatenate([self.speed, size * self.spin])
             rows = np.linalg.pinv(both.T)
@@ -251,7 +259,11 @@ class Balance:
         return found
 
     def _newton(self, share: float, ahead: Floats, f: float) -> Equilibrium | None:
-        """The equilibrium under a share of load and gravity, from deflections and a wall's force near it."""
+        """The equilibrium under a share of load and gravity, by Newton's method from deflections `ahead` (d,) and
+        a wall's force f [N] near it; None where it does not converge.
+
+        Raises  EquilibriumError  where the load buckles the links
+        """
         ahead = ahead.copy()
         self._bend(self.bending, share)
         for _ in range(STEPS):
@@ -265,12 +277,12 @@ class Balance:
             if counted is None:
                 return None
             weight = share * self._compensated(counted)
-            torques, unit = command_of(counted, self.screw, weight, f)
+            torques, per_force = command_of(counted, self.screw, weight, f)
             s = torques.copy()  # what each drive hands on to its joint
             s[self.flexible] = self.springs.torque(ahead)[self.flexible]
-            off, jacobian = self._equations(share, ahead, counted, torques, unit, s, f)
+            errors, jacobian = self._equations(share, ahead, counted, torques, per_force, s, f)
             size = float(np.max(np.abs(s), initial=0.0))
-            if np.max(np.abs(off), initial=0.0) <= SETTLED * max(size, abs(f)):
+            if np.max(np.abs(errors), initial=0.0) <= SETTLED * max(size, abs(f)):
                 found = self._result(self.springs.settled(ahead, SETTLED * self._scale(s)), counted, torques, s, f)
                 bending = self._bending_under(share, found, s)
                 if np.max(np.abs(bending - self.bending), initial=0.0) <= BENT * np.max(
@@ -281,7 +293,7 @@ class Balance:
                 continue
             with np.errstate(all="ignore"):
                 try:
-                    step = np.linalg.solve(jacobian, off)
+                    step = np.linalg.solve(jacobian, errors)
                 except np.linalg.LinAlgError:
                     return None
             if not np.max(np.abs(step[: len(self.flexible)]), initial=0.0) < LARGEST_STEP:
@@ -291,11 +303,13 @@ class Balance:
         return None
 
     def _scale(self, s: Floats) -> float:
-        """A torque [N m] by which others are judged as rounding: that of the drives, or of the whole weight."""
+        """A torque [N m] by which others are judged as rounding: the largest of the drives, s (d,), or of the
+        weight."""
         return float(max(np.max(np.abs(s), initial=0.0), np.max(self.heaviest, initial=0.0)))
 
     @property
     def _load_text(self) -> str:
+        """The load in words, for messages."""
         return self.load.text(unit_of_push(self.screw))
 
     def _not_held(self) -> str:
@@ -317,35 +331,47 @@ class Balance:
         ahead: Floats,
         counted: CountedPosture,
         torques: Floats,
-        unit: Floats,
+        per_force: Floats,
         s: Floats,
         f: float,
     ) -> tuple[Floats, Floats]:
-        """Errors of the balance of the flexible drives, and of the load along the direction, and their derivatives
-        by the deflections and the wall's force."""
-        F, count = self.flexible, len(self.flexible)
-        turning = command_change(counted, self.screw, share * self.gravity, self.compensation, f)
-        by_ahead = turning[:, F] if self.counts_motors else np.zeros((len(s), count))
-        tangent = np.zeros((len(s), count))
-        tangent[F] = np.diag(self.springs.tangent(ahead, self.load.branch == "backward")[F])
-        off, jacobian = (s - torques)[F], np.zeros((count, count))
-        jacobian[:, :] = (tangent - by_ahead)[F]
-        if self.normal is None:
-            return off, jacobian
-        row = self._push_of_torques()
-        by_spring = row @ self.motion.T
-        s_by_ahead, s_by_force = by_ahead.copy(), unit.copy()
-        s_by_ahead[F], s_by_force[F] = tangent[F], 0.0
-        off = np.append(off, row @ self._borne(s) - share * self.normal)
-        column = np.append(-unit[F], by_spring @ s_by_force)
-        return off, np.column_stack([np.vstack([jacobian, by_spring @ s_by_ahead]), column])
+        """Errors of the balance, and their derivatives by the deflections of the flexible drives and the wall's
+        force.
 
-    def _borne(self, s: Floats) -> Floats:
-        """Generalised forces (n,) on the joints but for the hand's."""
+        The errors are, for each flexible drive, its spring's torque less the motor's; and where a push is asked
+        for, the push along the direction less that.
+
+        share    of load and gravity that acts
+        ahead    (d,)  deflections;   f  the wall's force [N]
+        torques  (d,)  of the motors, and per_force (d,) their part per newton of the wall's force
+        s        (d,)  what each drive hands on to its joint
+        """
+        flexible, count = self.flexible, len(self.flexible)
+        turning = command_change(counted, self.screw, share * self.gravity, self.compensation, f)
+        by_ahead = turning[:, flexible] if self.counts_motors else np.zeros((len(s), count))
+        tangent = np.zeros((len(s), count))
+        tangent[flexible] = np.diag(self.springs.tangent(ahead, self.load.branch == "backward")[flexible])
+        errors, jacobian = (s - torques)[flexible], np.zeros((count, count))
+        jacobian[:, :] = (tangent - by_ahead)[flexible]
+        if self.normal is None:
+            return errors, jacobian
+        push_per_torque = self._push_of_torques()
+        by_spring = push_per_torque @ self.motion.T
+        s_by_ahead, s_by_force = by_ahead.copy(), per_force.copy()
+        s_by_ahead[flexible], s_by_force[flexible] = tangent[flexible], 0.0
+        errors = np.append(errors, push_per_torque @ self._forces_but_hand(s) - share * self.normal)
+        column = np.append(-per_force[flexible], by_spring @ s_by_force)
+        return errors, np.column_stack([np.vstack([jacobian, by_spring @ s_by_ahead]), column])
+
+    def _forces_but_hand(self, s: Floats) -> Floats:
+        """Generalised forces (n,) on the joints of gravity, free joints' springs and drives, which hand on s (d,):
+        all but the hand's."""
         return np.asarray(self.pull + self.free_springs + self.motion.T @ s)
 
     def _bending_under(self, share: float, found: Equilibrium, s: Floats) -> Floats:
-        """Elastic coordinates (x,) of the flexible links under the forces of an equilibrium.
+        """Elastic coordinates (x,) of the flexible links under the forces of an equilibrium, s (d,) the drives'.
+
+            (K - G) x = pushed,     G the derivative of these forces by x, which softens the stiffness K
 
         Raises  EquilibriumError  where the load buckles them
         """
@@ -354,25 +380,27 @@ class Balance:
             return np.zeros(0)
         force, moment = found.hand_force, found.hand_moment
         pushed = force @ handle.speed + moment @ handle.spin + share * self.weight + s @ self.drives.T
-        softened = np.tensordot(force, handle.speed_2, 1) + np.tensordot(moment, handle.turning, 1)
-        softened = softened + share * self.weight_change + np.tensordot(s, self.drives.Z, 1)
-        own = softened[n:, n:]
-        own = 0.5 * (own + own.T)
+        derivative = np.tensordot(force, handle.speed_2, 1) + np.tensordot(moment, handle.turning, 1)
+        derivative = derivative + share * self.weight_change + np.tensordot(s, self.drives.Z, 1)
+        softening = derivative[n:, n:]
+        softening = 0.5 * (softening + softening.T)
+        # K - G is definite where the largest eigenvalue of G against K is below 1
         root = np.linalg.cholesky(self.elastic)
-        half = np.linalg.solve(root, own)
+        half = np.linalg.solve(root, softening)
         most = float(np.max(np.linalg.eigvalsh(np.linalg.solve(root, half.T))))
         if not most < 1.0:
             raise EquilibriumError(
                 f"the links buckle under {self._load_text}: they bear {share / most:.4g} of it; choose a smaller "
                 "load, or stiffer links"
             )
-        return np.asarray(np.linalg.solve(self.elastic - own, pushed[n:]))
+        return np.asarray(np.linalg.solve(self.elastic - softening, pushed[n:]))
 
     def _result(self, ahead: Floats, counted: CountedPosture, torques: Floats, s: Floats, f: float) -> Equilibrium:
-        """The equilibrium at deflections `ahead`, motors' and springs' torques (d,) and the wall's force f [N]."""
-        borne = self._borne(s)
-        wrench = -(self.to_wrench @ borne)
-        left = borne + wrench[:3] @ self.speed + wrench[3:] @ self.spin
+        """The equilibrium at deflections `ahead`, motors' torques and those s that drives hand on, (d,) each, and
+        the wall's force f [N]."""
+        forces = self._forces_but_hand(s)
+        wrench = -(self.to_wrench @ forces)
+        remaining = forces + wrench[:3] @ self.speed + wrench[3:] @ self.spin
         return Equilibrium(
             load=self.load,
             screw=self.screw,
@@ -388,11 +416,12 @@ class Balance:
             torques=torques,
             ratio=self.ratio,
             compensation=self.compensation,
-            unbalanced=left,
+            unbalanced=remaining,
         )
 
     def check(self, found: Equilibrium) -> None:
-        """Raise EquilibriumError where drives, hand or wall do not hold what they would have to."""
+        """Raise EquilibriumError where drives, hand or wall do not hold what they would have to in an
+        equilibrium."""
         self._check_balance(found)
         self._check_torques(found.torques)
         self._check_across(found)
@@ -455,9 +484,11 @@ def command_change(
     """Derivative (d, d) of the torques that the computer asks for by the drives' coordinates that it counts, at a
     constant force of the wall: its force turns with the counts, and gravity with what is computed of it.
 
-        tau = T G b,  G = (T^T T)^-1,  b = f h - w(p_c)
+        tau = T G b,  G = (T^T T)^-1,  b = f h - w(p_c),  H = dh/dp,  Z = dT/dp
 
         dtau = Z G b - T G (Z^T T + T^T Z) G b + T G db,     db/dp = f H - dw/dp
+
+    screw (6,)  the rendered direction;   gravity (3,) [m/s²];   wall_force  f [N]
     """
     k = counted.seen.shape[0]
     T, Z = counted.drives.T[:, :k], counted.drives.Z[:, :k, :k]
@@ -470,7 +501,8 @@ def command_change(
         b, change = b - force[:k], change - derivative[:k, :k]
     G = np.linalg.inv(T.T @ T)
     x = G @ b
-    turned = np.einsum("ist,s->it", Z, x)
+    turned = np.einsum("ist,s->it", Z, x)  # Z G b
+    # (Z^T T + T^T Z) G b, what T^T T changes by
     inner = np.einsum("ist,i->st", Z, T @ x) + T.T @ turned
     return np.asarray((turned + T @ (G @ (change - inner))) @ counted.seen)
 
@@ -494,16 +526,16 @@ class DriveSprings:
     def of(cls, drives: Drives) -> DriveSprings:
         """The springs of the drives of one design."""
         n = drives.transmission
-        forward, dry = n**2 * drives.stiffness, drives.nonlinearity
-        if dry is None:
+        forward, nonlinear = n**2 * drives.stiffness, drives.nonlinearity
+        if nonlinear is None:
             return cls(forward, forward, np.zeros(len(n)), np.zeros(len(n)))
-        given = np.isfinite(dry.backward_stiffness) & np.isfinite(forward)
-        backward = np.where(given, n**2 * np.where(given, dry.backward_stiffness, 0.0), forward)
-        return cls(forward, backward, n**4 * dry.hardening, kinks(drives, dry))
+        given = np.isfinite(nonlinear.backward_stiffness) & np.isfinite(forward)
+        backward = np.where(given, n**2 * np.where(given, nonlinear.backward_stiffness, 0.0), forward)
+        return cls(forward, backward, n**4 * nonlinear.hardening, kinks(drives, nonlinear))
 
     @property
     def flexible(self) -> Ints:
-        """Which drives are flexible."""
+        """Indices of the flexible drives."""
         return np.flatnonzero(np.isfinite(self.forward))
 
     def settled(self, deflection: Floats, rounding: float) -> Floats:
@@ -518,7 +550,7 @@ class DriveSprings:
         return np.asarray(np.isfinite(self.forward) & (self.forward != self.backward) & (deflection == self.kink))
 
     def torque(self, deflection: Floats) -> Floats:
-        """Torques (d,) of deflections (d,), 0 of rigid drives."""
+        """Torques (d,) [N m] of deflections (d,), 0 of rigid drives."""
         flexible = np.isfinite(self.forward)
         k, other = (np.where(flexible, each, 0.0) for each in (self.forward, self.backward))
         past = np.minimum(deflection - self.kink, 0.0)
@@ -527,7 +559,7 @@ class DriveSprings:
     def tangent(self, deflection: Floats, backward: bool) -> Floats:
         """dT/dd (d,): k + 3 k_3 d^2, inf of rigid drives.
 
-        backward  which branch is meant of a drive at its kink
+        backward  of a drive at its kink: True: the branch on which the motor lags behind; False: the other
         """
         lags = (deflection < self.kink) | ((deflection == self.kink) & backward)
         return np.asarray(np.where(lags, self.backward, self.forward) + 3.0 * self.hardening * deflection**2)

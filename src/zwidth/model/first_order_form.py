@@ -64,10 +64,11 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
     second_reading  (3, n)  weights of x'', x' and x in a force; a pole is hidden only if it moves this neither. Of
                             motions without springs it must read no place, of those without dampers no velocity
     """
-    free, braked, elastic, idle = _motions(plant, second_reading)
+    free, braked, elastic, idle = _split_motions(plant, second_reading)
     damped_or_elastic = np.hstack([braked, elastic])
     A, source, reading = _state_matrices(plant, braked, damped_or_elastic, period)
     ends = np.abs(np.hstack([free, damped_or_elastic]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
+    # the motions' parts in the force, summed, times those in the reading: against this rounding is told
     together = float(np.prod(ends.sum(axis=0)))
     poles, hidden = _poles(A, source, reading, period, together * period**2)
     inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
@@ -80,8 +81,9 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
         if np.any(second):
             # a feedback of it moves poles by what it reads of them: here that counts itself, not a share of all
             hidden &= _poles(A, source, second, period, SECOND_UNREAD / UNOBSERVED_UNDAMPED)[1]
+    # poles at 0 of the places of braked motions that A leaves out: it has one state at most for all of them
     unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
-    hidden_poles = np.concatenate([poles[hidden], unread, _own_poles(plant, idle)])
+    hidden_poles = np.concatenate([poles[hidden], unread, _poles_of_idle(plant, idle)])
     free_count = int(free.shape[1])
     return FirstOrderForm(A, source, reading, poles[~hidden], hidden_poles, inertia, free_count, second, direct)
 
@@ -96,7 +98,7 @@ def _second_output(
     rows            (3, n)
     """
     k, e = basis.shape[1], elastic.shape[1]
-    x = len(A) - k - lag_count
+    x = len(A) - k - lag_count  # index of the first velocity; the elastic coordinates are just before it
     out = np.asarray(rows[0] @ basis @ A[x : x + k] / period)
     out[x : x + k] += rows[1] @ basis / period
     out[x - e : x] += rows[2] @ elastic
@@ -104,12 +106,12 @@ def _second_output(
 
 
 def _drag(plant: Plant) -> Floats:
-    """All damping as if no damper lagged, (n, n)."""
+    """Damping (n, n) of the plant as if its lagged dampers did not lag."""
     lagged = [damper.damping * np.outer(damper.along, damper.along) for damper in plant.lagged_dampers]
     return np.asarray(plant.damping + sum(lagged, np.zeros_like(plant.damping)))
 
 
-def _motions(plant: Plant, second_reading: Floats | None) -> tuple[Floats, Floats, Floats, Floats]:
+def _split_motions(plant: Plant, second_reading: Floats | None) -> tuple[Floats, Floats, Floats, Floats]:
     """Mass-normalised motions: free of stiffness and damping (n, f), braked but free of stiffness (n, b), and
     elastic ones that are moved or read (n, e), and idle (n, i)."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
@@ -120,14 +122,15 @@ def _motions(plant: Plant, second_reading: Floats | None) -> tuple[Floats, Float
     shapes = np.where(squared == 0.0, shapes, separated)
     drag = _drag(plant)
     rigid, elastic = shapes[:, squared == 0.0], shapes[:, (squared != 0.0) & ~idle]
+    # motions without stiffness may be combined: along the axes of their damping each has its own, or none
     brakes, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
     level = 1e-13 * max(float(np.max(np.abs(shapes.T @ drag @ shapes))), np.finfo(float).tiny)
     slides = np.abs(brakes) <= level
     return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic, shapes[:, idle]
 
 
-def _own_poles(plant: Plant, motions: Floats) -> Complexes:
-    """Poles (2 i,) [1/s] of mass-normalised motions (n, i) that nothing else couples to."""
+def _poles_of_idle(plant: Plant, motions: Floats) -> Complexes:
+    """Poles (2 i,) [1/s] of idle motions (n, i), which are mass-normalised and couple to no others."""
     count = motions.shape[1]
     A = np.zeros((2 * count, 2 * count))
     A[:count, count:] = np.eye(count)
@@ -137,37 +140,44 @@ def _own_poles(plant: Plant, motions: Floats) -> Complexes:
 
 
 def _state_matrices(plant: Plant, braked: Floats, basis: Floats, period: float) -> tuple[Floats, Floats, Floats]:
-    """A, input and output on [what is read of the braked motions, elastic coordinates, velocities of both, forces
-    of the lagged dampers]."""
+    """A (N, N), input and output (N,) on the states [what is read of the braked motions, elastic coordinates,
+    velocities of both, forces of the lagged dampers].
+
+    braked, basis  (n, b), (n, k)  mass-normalised motions: those without stiffness, and all, elastic ones behind
+                   them
+    """
     k, b, lags = basis.shape[1], braked.shape[1], plant.lagged_dampers
     elastic = basis[:, b:]
     read = braked.T @ plant.sensor
     size = float(np.linalg.norm(read))
     if size <= UNREAD * float(np.linalg.norm(basis.T @ plant.sensor)):
         read, size = read[:0], 0.0
-    x = int(size > 0.0) + k - b  # coordinates come first, then k velocities
-    n = x + k + len(lags)
+    first_velocity = int(size > 0.0) + k - b  # coordinates come first, then k velocities [m per period]
+    n = first_velocity + k + len(lags)
     A, source, reading = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     if size > 0.0:
-        A[0, x : x + b], reading[0] = read / size / period, size
-    at = slice(x - (k - b), x)
-    A[at, x + b : x + k] = np.eye(k - b) / period
-    A[x : x + k, at] = -(basis.T @ plant.stiffness @ elastic) * period
-    A[x : x + k, x : x + k] = -(basis.T @ plant.damping @ basis)
+        A[0, first_velocity : first_velocity + b], reading[0] = read / size / period, size
+    elastic_at = slice(first_velocity - (k - b), first_velocity)
+    A[elastic_at, first_velocity + b : first_velocity + k] = np.eye(k - b) / period
+    A[first_velocity : first_velocity + k, elastic_at] = -(basis.T @ plant.stiffness @ elastic) * period
+    A[first_velocity : first_velocity + k, first_velocity : first_velocity + k] = -(
+        basis.T @ plant.damping @ basis
+    )
     for i, damper in enumerate(lags):
-        along, own = basis.T @ damper.along, x + k + i
-        A[x : x + k, own] = -damper.damping * along
-        A[own, x : x + k] = along / damper.time_constant
-        A[own, own] = -1.0 / damper.time_constant
-    source[x : x + k] = basis.T @ plant.actuator * period
-    reading[at] = elastic.T @ plant.sensor
+        along, lag_at = basis.T @ damper.along, first_velocity + k + i
+        A[first_velocity : first_velocity + k, lag_at] = -damper.damping * along
+        A[lag_at, first_velocity : first_velocity + k] = along / damper.time_constant
+        A[lag_at, lag_at] = -1.0 / damper.time_constant
+    source[first_velocity : first_velocity + k] = basis.T @ plant.actuator * period
+    reading[elastic_at] = elastic.T @ plant.sensor
     return A, source, reading
 
 
 def _poles(
     A: Floats, source: Floats, reading: Floats, period: float, alone_gain: float
 ) -> tuple[Complexes, Flags]:
-    """All poles, and which of them the force does not move or the sensor does not read.
+    """All poles (k,) [1/s] of A (k, k), and (k,) which of them are hidden: `source` (k,) does not move them, or
+    `reading` (k,) does not show them, beyond rounding; many fast ones also if it is hardly.
 
     alone_gain  what a unit force held for T would leave in the reading if no motion held another back [m/N]
 
@@ -181,27 +191,28 @@ def _poles(
     poles, left, right = eig(balanced, left=True)
     poles[np.abs(poles) <= ZERO * np.max(np.abs(poles))] = 0.0
     overlap = np.sum(left.conj() * right, axis=0)
-    alone = np.abs(overlap) > SHARED
+    single = np.abs(overlap) > SHARED  # only of such a pole can it be told
     source, reading = source / scale, reading * scale
     still = poles == 0.0
     # |(exp(s T) - 1)/s|: what a unit force held for T leaves
     reach = np.where(still, period, np.abs(np.expm1(poles * period)) / np.where(still, 1.0, np.abs(poles)))
-    reach = reach / np.where(alone, np.abs(overlap), 1.0)
+    reach = reach / np.where(single, np.abs(overlap), 1.0)
     gain = np.abs((left.conj().T @ source) * (reading @ right)) * reach
     rounding = ROUNDING * (np.abs(left.T) @ np.abs(source)) * (np.abs(reading) @ np.abs(right)) * reach
     least = np.zeros(len(poles))
     if len(poles) > MANY:
-        largest = min(alone_gain, float(np.max(gain, where=alone, initial=0.0)))
+        largest = min(alone_gain, float(np.max(gain, where=single, initial=0.0)))
         least = np.where(np.abs(poles) * period > FAST, UNOBSERVED * largest, 0.0)
     # an undamped motion that the wall hardly moves could only hide the stability of the rest
     least = np.where(np.abs(poles.real) * period < 1e-9, UNOBSERVED_UNDAMPED * alone_gain, least)
-    hidden = alone & (gain <= np.maximum(least, rounding))
+    hidden = single & (gain <= np.maximum(least, rounding))
     return poles, hidden & hidden[_partners(poles)]
 
 
 def fast_and_unseen(A: Floats, inputs: Floats, readings: Floats, period: float) -> tuple[Complexes, Complexes]:
-    """Poles of a form, and those of them that are fast and that no input of several (r, k) moves in any reading
-    (q, k), on states of which the first half are amplitudes of modes and the next their velocities [m per period].
+    """Poles of A (k, k) [1/s]: those that are slow or that some input moves in some reading, and all others.
+
+    inputs, readings  (r, k), (q, k)  on states that are amplitudes of modes, then their velocities [m per period]
     """
     poles, unseen = np.zeros(0, dtype=complex), np.ones(len(A), dtype=np.bool_)
     for source in inputs:
@@ -213,7 +224,7 @@ def fast_and_unseen(A: Floats, inputs: Floats, readings: Floats, period: float) 
 
 
 def _partners(poles: Complexes) -> Ints:
-    """The index of each pole's conjugate."""
+    """The index (p,) of each pole's conjugate among them; of a real pole its own."""
     return np.asarray(np.argmin(np.abs(poles[:, None] - poles.conj()), axis=1))
 
 
@@ -233,7 +244,8 @@ def without_hidden_poles(form: FirstOrderForm) -> FirstOrderForm:
 
 
 def invariant_subspace(form: FirstOrderForm, poles: Complexes) -> tuple[Floats, Floats]:
-    """Bases (k, p) of the right and the left invariant subspace of some of the poles, left^T right = 1."""
+    """Bases (k, p) of the right and of the left invariant subspace of the form's A for p of its poles,
+    left^T right = 1."""
     from scipy.linalg import matrix_balance, schur
 
     every = np.concatenate([form.poles, form.hidden_poles])
@@ -264,18 +276,20 @@ COUPLED = 1e-7
 
 
 def modal_damping(plant: Plant, shapes: Floats) -> Floats:
-    """The damping (n, n) [1/s] in coordinates of modes, symmetric and without rounding of 0."""
+    """The damping (n, n) [1/s] in coordinates of mass-normalised modes, the columns of shapes (n, n), symmetric
+    and without rounding of 0."""
     damping = shapes.T @ plant.damping @ shapes
     damping = (damping + damping.T) / 2.0
-    own = np.abs(np.diag(damping))
+    diagonal = np.abs(np.diag(damping))
     # B is positive semidefinite: a mode that dissipates nothing by itself is not damped through others either
-    still = own <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
+    still = diagonal <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
     damping[still, :] = damping[:, still] = 0.0
     return np.where(_coupling(damping), damping, np.diag(np.diag(damping)))
 
 
 def separated_modes(plant: Plant, squared: Floats, shapes: Floats, ends: Floats) -> tuple[Floats, Flags]:
-    """Modes of which as few as can be are moved by forces along some ends, or show in a reading there, and which.
+    """Modes, of which as few as can be are moved by forces along some ends or show in a reading there; and which
+    are.
 
     Rounding chooses the shapes of equal modes. What is moved of them, by an end or by dampers of what is moved, is
     a subspace, and the shapes are turned into it and across it; those across are idle.
@@ -291,12 +305,12 @@ def separated_modes(plant: Plant, squared: Floats, shapes: Floats, ends: Floats)
     couplings = [_scaled(matrix, runs) for matrix in (damping, *others)]
     parts = ends @ shapes
     parts /= np.maximum(np.linalg.norm(parts, axis=1, keepdims=True), 1e-300)
-    moved = []
+    moved = []  # of each run: orthonormal basis of what is moved of its modes
     for run in runs:
         damped = float(np.max(np.diag(damping)[run])) > 0.0
         empty = np.zeros((run.stop - run.start, 0))
         moved.append(_widened(empty, parts[:, run].T, IDLE_DAMPED if damped else IDLE))
-    waiting = list(range(len(runs)))
+    waiting = list(range(len(runs)))  # runs whose moved motions may push others
     while waiting:
         source = waiting.pop(0)
         pushed = np.hstack([M[:, runs[source]] @ moved[source] for M in couplings])
@@ -316,17 +330,19 @@ def separated_modes(plant: Plant, squared: Floats, shapes: Floats, ends: Floats)
 
 
 def _scaled(matrix: Floats, runs: list[slice]) -> Floats:
-    """A matrix (n, n) on modes by what it does to the modes of each frequency themselves: 1 or less of dampers.
+    """A matrix (n, n) on modes, its element i, j over the root of the largest diagonal elements at the frequencies
+    of i and of j: 1 or less of dampers. runs: the modes of each frequency.
 
     What does nothing to any by itself is scaled as a whole, so that all of it but its rounding couples.
     """
-    own = np.ones(len(matrix))
+    sizes = np.ones(len(matrix))
     for run in runs:
-        own[run] = np.sqrt(np.max(np.abs(np.diag(matrix)[run])))
-    if not np.any(own):
+        sizes[run] = np.sqrt(np.max(np.abs(np.diag(matrix)[run])))
+    if not np.any(sizes):
+        # all above UNDAMPED of the largest then is above COUPLED
         return np.asarray(matrix / (UNDAMPED / COUPLED * np.max(np.abs(matrix)) or 1.0))
-    own[own == 0.0] = 1.0
-    return np.asarray(matrix / np.outer(own, own))
+    sizes[sizes == 0.0] = 1.0
+    return np.asarray(matrix / np.outer(sizes, sizes))
 
 
 def _widened(basis: Floats, columns: Floats, level: float) -> Floats:
@@ -334,15 +350,14 @@ def _widened(basis: Floats, columns: Floats, level: float) -> Floats:
     if basis.shape[0] == basis.shape[1] or np.linalg.norm(columns) <= level:
         return basis
     outside = columns - basis @ (basis.T @ columns)
-    outside -= basis @ (
-        basis.T @ outside
-    )  # what rounding has left, which would grow as a small rest gets length 1
+    # once more for what rounding has left, which would grow as a small remainder gets length 1
+    outside -= basis @ (basis.T @ outside)
     ways, sizes, _ = np.linalg.svd(outside, full_matrices=False)
     return np.hstack([basis, ways[:, sizes > level]])
 
 
 def _coupling(matrix: Floats) -> Flags:
-    """Marks (n, n) of the pairs of modes that a symmetric matrix (n, n) in modal coordinates couples by more than
-    a share of what it does to both of them."""
-    own = np.sqrt(np.abs(np.diag(matrix)))
-    return np.asarray((np.abs(matrix) > IDLE * np.outer(own, own)) & ~np.eye(len(own), dtype=bool))
+    """Which pairs of modes (n, n) a symmetric matrix (n, n) in modal coordinates couples by more than IDLE, as a
+    share of what it does to both of them."""
+    root = np.sqrt(np.abs(np.diag(matrix)))
+    return np.asarray((np.abs(matrix) > IDLE * np.outer(root, root)) & ~np.eye(len(root), dtype=bool))

@@ -163,7 +163,7 @@ class FlexibleLink:
         return len(self.body.stiffness)
 
     def station_of(self, local: Floats) -> int:
-        """The station to which a point (3,) of the link's frame is fixed."""
+        """Index of the station to which a point (3,) of the link's frame is fixed: the nearest along the beam."""
         along = min(max(float(local[0]), 0.0), self.beam.length)
         return int(np.argmin(np.abs(self.body.stations - along)))
 

@@ -123,7 +123,7 @@ def place_links(mech: MechanismArrays, design: int, angles: Floats, work: Workin
                     R[i, x, y] = C[k, i, 0, x, y] + s * C[k, i, 1, x, y] + c * C[k, i, 2, x, y]
             continue
         for x in range(3):
-            a, b, e = R[p, x, 0], R[p, x, 1], R[p, x, 2]
+            a, b, e = R[p, x, 0], R[p, x, 1], R[p, x, 2]  # row x of the parent's axes
             o[i, x] = o[p, x] + a * ox + b * oy + e * oz
             z[i, x] = a * zx + b * zy + e * zz
         for y in range(3):
@@ -136,7 +136,11 @@ def place_links(mech: MechanismArrays, design: int, angles: Floats, work: Workin
 
 @compiled_lean
 def _place_behind_ball(i: int, angles: Floats, R: Floats, o: Floats, z: Floats, turn: Floats) -> None:
-    """The link i behind a ball joint, whose parent stands where i would with v = 0; and the three axes."""
+    """Fill axes R, origin o and joint axes z of link i behind a ball joint, with v = angles[i - 2 : i + 1].
+
+    Its parent i - 1, which does not turn, stands where i would with v = 0; the joint's axes are those of links i -
+    2 to i. turn (3, 3) is scratch.
+    """
     p = i - 1
     fill_rotation(angles[i - 2], angles[i - 1], angles[i], turn)
     for x in range(3):

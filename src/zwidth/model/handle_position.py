@@ -14,6 +14,9 @@ nearest.
 
 Check that each degree of freedom has a drive or is said to be free, and that the handle shows the drives; joint
 axes and the mass matrix of all joints of a mechanism with its loops cut open, which say what moves without mass.
+
+Shapes have the letters of `MechanismArrays`, and goals g numbers: the handle's position [m], the vector of its
+orientation [rad], or one after the other.
 """
 
 from __future__ import annotations
@@ -47,7 +50,8 @@ TURN: Final = 0.02  # of a drive in one step to a posture given by its joints [r
 
 
 def answered_goal(mech: MechanismArrays, design: int, references: Floats, goal: Floats) -> Floats | None:
-    """A goal (g,) near a goal (g,) of the handle that the assembly of the references (P, n) can have.
+    """A goal (g,) near `goal` (g,) that the handle of one design can have in the assembly of the references (P,
+    n).
 
     Not shown to be the nearest; a little within the edge of its workspace. None where none is found, or the goal
     is not finite.
@@ -65,6 +69,7 @@ def answered_goal(mech: MechanismArrays, design: int, references: Floats, goal: 
     # a descent weighs turns against shifts and may end far away: the straight way is looked at, too
     reference = handle_goal(mech, design, references[design])
     share = _reached_shares(mech, design, references, reference, goal[None])[0]
+    # the first that is reached on the way back
     found = [candidates[np.argmax(reached)]] if reached.any() else []
     found += [reference + share * (goal - reference)] if share > 0.0 else []
     return min(found, key=lambda near: goal_distance(mech, design, near, goal), default=None)
@@ -88,8 +93,8 @@ def _reached_shares(mech: MechanismArrays, design: int, references: Floats, begi
 
 
 def positions_about_reference(mech: MechanismArrays, reference: Floats) -> Floats:
-    """How far a handle of one design goes without turning from its reference posture (n,), in 26 directions, and
-    where it begins: positions (27, 3) [m].
+    """Positions (27, 3) [m] that a handle of one design gets to without turning from its reference posture (n,),
+    in 26 directions, and that where it begins.
 
     No farther than the mechanism is large. A roadmap of so many drives is too coarse to tell this.
     """
@@ -115,14 +120,14 @@ def goal_difference(mech: MechanismArrays, a: Floats, b: Floats) -> tuple[float,
     if mech.controls != ORIENTATION:
         shift = float(np.linalg.norm(a[:3] - b[:3]))
     if mech.controls != POSITION:
-        turned = rotation_matrix(a[-3:]) @ rotation_matrix(b[-3:]).T
-        turn = float(np.linalg.norm(rotation_vector(turned)))
+        between = rotation_matrix(a[-3:]) @ rotation_matrix(b[-3:]).T
+        turn = float(np.linalg.norm(rotation_vector(between)))
     return shift, turn
 
 
 def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) -> tuple[Floats, Floats, float]:
-    """The handle's goals (g,) where a descent begins and where it ends, from joint coordinates (n,), and how far
-    the end is from what is wanted [m]."""
+    """Descend from joint coordinates `start` (n,) to the goal (g,). Returned are the goals (g,) that the handle
+    has where the descent begins and where it ends, and how far the end is from what is wanted [m]."""
     angles, d = start.copy(), mech.driven
     rows, gaps = constraints(mech, design, angles, goal)
     loops = int(mech.first_row[-1])
@@ -132,7 +137,7 @@ def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) ->
     damping, scale = 1e-3, float(mech.size[design]) ** 2
     for _ in range(DESCENTS):
         missing = gaps[loops:]
-        motions = _motions(rows[:moved], loops, d) * unit
+        motions = _closed_motions(rows[:moved], loops, d) * unit
         J = rows[:moved, loops:].T @ motions
         turn = np.linalg.solve(J.T @ J + damping * scale * np.eye(d), J.T @ missing)
         largest = float(np.max(np.abs(turn)))
@@ -143,13 +148,13 @@ def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) ->
         step = np.zeros(len(rows))
         step[:moved] = motions @ turn
         move_joints(mech, trial, step)
-        new = _close_loops(mech, design, trial, goal)
-        nearer = np.linalg.norm(new[1][loops:]) < np.linalg.norm(missing)
+        new_rows, new_gaps = _close_loops(mech, design, trial, goal)
+        nearer = np.linalg.norm(new_gaps[loops:]) < np.linalg.norm(missing)
         # A pose led elsewhere than it should go has passed a singularity, beyond which rounding decides the way
         led = J @ turn
-        astray = float(np.linalg.norm(missing - led - new[1][loops:]))
+        astray = float(np.linalg.norm(missing - led - new_gaps[loops:]))
         if nearer and (mech.controls != POSE or astray <= ASTRAY * float(np.linalg.norm(led))):
-            angles, (rows, gaps), damping = trial, new, max(0.1 * damping, 1e-15)
+            angles, rows, gaps, damping = trial, new_rows, new_gaps, max(0.1 * damping, 1e-15)
         else:
             damping *= 10.0
             if damping > 1e6:
@@ -157,8 +162,11 @@ def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) ->
     return begin, handle_goal(mech, design, angles), float(np.linalg.norm(gaps[loops:]))
 
 
-def _motions(rows: Floats, loops: int, driven: int) -> Floats:
-    """N (m, d): what all unknowns but the free ones do for a unit of each drive, so that no loop opens."""
+def _closed_motions(rows: Floats, loops: int, driven: int) -> Floats:
+    """N (m, d): what all unknowns but the free ones do for a unit of each drive, so that no loop opens.
+
+    rows  (m, r)  of `constraints`, of these unknowns, the first `loops` of their r equations those of the loops
+    """
     passive = len(rows) - driven
     motions = np.zeros((len(rows), driven))
     motions[passive:] = np.eye(driven)
@@ -192,9 +200,9 @@ def handle_goal(mech: MechanismArrays, design: int, angles: Floats) -> Floats:
     return turned if mech.controls == ORIENTATION else np.concatenate([position, turned])
 
 
-# Fills in position (3,) [m] and axes (3, 3) of one design's handle at joint coordinates (n,).
 @compiled
 def _fill_handle(mech: MechanismArrays, design: int, angles: Floats, position: Floats, axes: Floats) -> None:
+    """Fill position (3,) [m] and axes (3, 3) of one design's handle at joint coordinates (n,)."""
     work = working_memory(mech)
     place_links(mech, design, angles, work)
     h = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
@@ -220,7 +228,8 @@ def goal_of_angles(mech: MechanismArrays, reference: Floats, driven: Floats) -> 
 
 @compiled
 def _turn_drives(mech: MechanismArrays, angles: Floats, turn: Floats, count: int) -> bool:
-    """Turn every drive by its share, so many times (in place); False where that leads to or past a singularity."""
+    """Turn every drive by turn (d,), `count` times, from joint coordinates angles (n,) (in place); False where
+    that leads to or past a singularity."""
     work = working_memory(mech)
     begin_to_turn(mech, angles, work)
     for _ in range(count):
@@ -362,8 +371,9 @@ def joint_mass_matrix(mechanism: Mechanism, coordinates: Floats) -> Floats:
     design, the loops cut open; joints in the order of the unknowns (`MechanismArrays.joint`). A ratio that changes
     is the first of its table: what is asked is whether every motion has a mass."""
     mech, drives = pack(mechanism), with_any_ratio(mechanism.drives)
-    none = np.zeros(0, dtype=np.int64)
-    cut = mech._replace(a=none, b=none, closing=none, first_row=np.zeros(1, dtype=np.int64))
+    no_closures = np.zeros(0, dtype=np.int64)
+    # every joint is a coordinate of its own then
+    cut = mech._replace(a=no_closures, b=no_closures, closing=no_closures, first_row=np.zeros(1, dtype=np.int64))
     M = np.empty((1, mech.joint.size, mech.joint.size))
     _mass(cut._replace(driven=mech.joint.size, free=0), np.ascontiguousarray(coordinates), M)
     rigid = np.where(np.isinf(drives.stiffness), drives.transmission**2 * drives.motor_inertia, 0.0)
@@ -373,17 +383,17 @@ def joint_mass_matrix(mechanism: Mechanism, coordinates: Floats) -> Floats:
     return np.asarray(M[0] + np.diag(rotors))
 
 
-# Joint axes (n, 3) of the only design in the base frame, at joint coordinates (n,).
 @compiled
 def _axes(mech: MechanismArrays, angles: Floats) -> Floats:
+    """Joint axes (n, 3) of the only design in the base frame, at joint coordinates (n,)."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     return work.axis
 
 
-# Fills in out (1, c, c), the links' mass matrix in the independent coordinates, at joint coordinates (n,).
 @compiled
 def _mass(mech: MechanismArrays, angles: Floats, out: Floats) -> None:
+    """Fill out (1, c, c), the links' mass matrix in the independent coordinates, at joint coordinates (n,)."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)

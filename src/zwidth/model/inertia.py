@@ -1,4 +1,8 @@
-"""Mass matrix and handle Jacobians in the independent coordinates, compiled."""
+"""Mass matrix and handle Jacobians in the independent coordinates, compiled.
+
+p are these c coordinates; `spin`, `speed` and the like are the fields of `WorkingMemory`, design the index of the
+design.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +50,8 @@ def unit_motions(mech: MechanismArrays, work: WorkingMemory) -> None:
 def handle_jacobian(
     mech: MechanismArrays, design: int, work: WorkingMemory, out: Floats, angular: Floats, index: int
 ) -> None:
-    """dh/dp and the handle's angular velocity per unit rate, from the unit motions, into [index] (3, c) of each.
+    """The handle's velocity and angular velocity per unit rate of each independent coordinate, from
+    `unit_motions`, into out[index] and angular[index], (3, c) each.
 
     A platform that its legs keep from turning turns by rounding, which is set to 0.
     """

@@ -74,8 +74,9 @@ def _regressors(
     angles: Floats,
     out: Floats,
 ) -> int:
-    """Fill the regressors `out` and joint coordinates `angles` of a series of postures, each begun from the one
-    before. Returns how many were done before one whose loops do not close."""
+    """Fill the regressors out (N, c, 10 w) and joint coordinates angles (N, n) of `inertia_regressor`, whose
+    arguments these are, each posture begun from the one before. Returns how many were done before one whose loops
+    do not close."""
     work, flow = working_memory(mech), new_link_accelerations(mech)
     present = start.copy()
     place_links(mech, 0, present, work)
@@ -87,7 +88,9 @@ def _regressors(
         unit_motions(mech, work)
         _accelerate_links(mech, work, flow, rates[i], accelerations[i], gravity)
         for body in range(mech.bodies.size):
-            _of_body(mech.bodies[body], work, flow, out[i, :, PARAMETERS * body : PARAMETERS * (body + 1)])
+            _fill_body_regressor(
+                mech.bodies[body], work, flow, out[i, :, PARAMETERS * body : PARAMETERS * (body + 1)]
+            )
         for j in range(present.size):
             angles[i, j] = present[j]
     return int(coordinates.shape[0])
@@ -102,30 +105,32 @@ def _accelerate_links(
     accelerations: Floats,
     gravity: Floats,
 ) -> None:
-    """Fill the links' velocities and accelerations of a closed posture with unit motions.
+    """Fill `flow` with the links' velocities and accelerations at rates p' and accelerations p'' (c,), in a closed
+    posture with unit motions.
 
     q'' = B p'' + B' p': the second part is what the closures' accelerations leave to the passive joints.
     """
-    speeds, turning, per_unit = flow.rates, flow.joint_accelerations, work.rates
+    speeds, joint_accelerations, per_unit = flow.rates, flow.joint_accelerations, work.rates
     m, independent = speeds.size, per_unit.shape[0]
     for u in range(m):
         speed, change = 0.0, 0.0
         for s in range(independent):
             speed += rates[s] * per_unit[s, u]
             change += accelerations[s] * per_unit[s, u]
-        speeds[u], turning[u] = speed, change
+        speeds[u], joint_accelerations[u] = speed, change
     fill_accelerations(mech, work, gravity, flow)
     if mech.a.size > 0:
         closing_accelerations(mech, 0, work, flow, gravity)
         closure_step(mech, work)
         for u in range(m - independent):
-            turning[u] += mech.unit[0, u] * work.solution[0, u]
+            joint_accelerations[u] += mech.unit[0, u] * work.solution[0, u]
         fill_accelerations(mech, work, gravity, flow)
 
 
 @compiled_lean
-def _of_body(i: int, work: WorkingMemory, flow: LinkAccelerations, out: Floats) -> None:
-    """The generalised forces (c, 10) per unit of each parameter of link i."""
+def _fill_body_regressor(i: int, work: WorkingMemory, flow: LinkAccelerations, out: Floats) -> None:
+    """Fill out (c, 10): generalised force of each coordinate per unit of each parameter of link i, in the order of
+    phi."""
     R, spin, speed = work.rotation, work.spin, work.speed
     a, w, b = flow.acceleration, flow.angular_velocity, flow.angular_acceleration
     ax, ay, az = _into_link(R, a, i)
@@ -135,13 +140,14 @@ def _of_body(i: int, work: WorkingMemory, flow: LinkAccelerations, out: Floats) 
     for s in range(out.shape[0]):
         vx, vy, vz = _into_link(R, speed[s], i)
         sx, sy, sz = _into_link(R, spin[s], i)
+        # per unit of the mass: a . v, with v, s the unit motion of this coordinate
         out[s, 0] = ax * vx + ay * vy + az * vz
-        # b x e + w (w . e) - e (w . w) along v, and e x a about s, of the three unit vectors e
+        # of the first moment, for each unit vector e: b x e + w (w . e) - e (w . w) along v, and e x a about s
         along = wx * vx + wy * vy + wz * vz
         out[s, 1] = bz * vy - by * vz + wx * along - square * vx + sz * ay - sy * az
         out[s, 2] = bx * vz - bz * vx + wy * along - square * vy + sx * az - sz * ax
         out[s, 3] = by * vx - bx * vy + wz * along - square * vz + sy * ax - sx * ay
-        # s . I b + (s x w) . I w
+        # of the inertia, xx, yy, zz, xy, xz, yz: s . I b + (s x w) . I w, d = s x w
         dx, dy, dz = sy * wz - sz * wy, sz * wx - sx * wz, sx * wy - sy * wx
         out[s, 4] = sx * bx + dx * wx
         out[s, 5] = sy * by + dy * wy
@@ -153,7 +159,7 @@ def _of_body(i: int, work: WorkingMemory, flow: LinkAccelerations, out: Floats) 
 
 @compiled_lean
 def _into_link(R: Floats, vectors: Floats, i: int) -> tuple[float, float, float]:
-    """The vector of link i, given in the base frame, in the link's axes."""
+    """The vector i of vectors (n, 3), which are given in the base frame, in the axes R[i] of its link."""
     x, y, z = vectors[i, 0], vectors[i, 1], vectors[i, 2]
     return (
         R[i, 0, 0] * x + R[i, 1, 0] * y + R[i, 2, 0] * z,

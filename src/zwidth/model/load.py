@@ -58,7 +58,7 @@ class Load:
     branch: Literal["forward", "backward"] = "forward"
 
     def __post_init__(self) -> None:
-        """Make lists arrays (3,) and check them."""
+        """Make lists arrays (3,), two components given a third of 0, and raise what the class says."""
         for name, unit in (("force", "N"), ("moment", "N m"), ("gravity", "m/s²")):
             given = getattr(self, name)
             if given is None:
@@ -98,11 +98,12 @@ class Load:
         return self._values == other._values if isinstance(other, Load) else NotImplemented
 
     def __hash__(self) -> int:
-        """Of the values, so that equal loads are one key."""
+        """Hash of all numbers and words, so that equal loads are one key."""
         return hash(self._values)
 
     @property
     def _values(self) -> tuple[object, ...]:
+        """The fields, arrays as tuples, to compare and to hash."""
         values = (getattr(self, each.name) for each in fields(self))
         return tuple(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in values)
 
@@ -147,7 +148,8 @@ class Load:
         if other is not None:
             wanted = "force" if linear else "moment"
             raise LoadError(
-                f"the wall is rendered along {_way(linear)}; give the load as a {wanted} [{unit}], or push"
+                f"the wall is rendered along {_kind_of_direction(linear)}; give the load as a {wanted} "
+                f"[{unit}], or push"
             )
         if given is None:
             return None
@@ -181,9 +183,11 @@ def vector_text(values: Floats) -> str:
     return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"
 
 
-def _way(linear: bool) -> str:
+def _kind_of_direction(linear: bool) -> str:
+    """What is rendered, in words: a direction, along which forces act, or an axis, about which moments do."""
     return "a direction" if linear else "an axis"
 
 
 def _is_finite(value: object) -> bool:
+    """Whether the value is a finite real number; True and False are none."""
     return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)

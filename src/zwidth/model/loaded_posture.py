@@ -60,14 +60,15 @@ def loaded_postures(
     """The postures under load of postures (...) without it, one by one; designs broadcast with them.
 
     posture  as it is asked for; one that was found under load stands for the one that it was found from
-    screws   (..., 6)  rendered directions
+    screws   (..., 6)  rendered directions;   counts_motors  whether encoders are on the motors, or behind the
+             drives
     Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM
     Raises   EquilibriumError, LoadError  for a single posture without one
              LoadError  for a load that can be meant in no posture of a batch
     """
     posture = posture.asked or posture
     if not posture.status.shape:
-        return replace(_loaded(mechanism, posture, screws, load, counts_motors), asked=posture)
+        return replace(_loaded_posture(mechanism, posture, screws, load, counts_motors), asked=posture)
     changed, shape = replace(posture.with_axes(np.array), asked=posture), posture.status.shape
     refused: LoadError | None = None
     numbers = [changed.angles, changed.mass_matrix, changed.jacobian, changed.angular_jacobian]
@@ -77,8 +78,8 @@ def loaded_postures(
             continue
         single = at_index(index)
         try:
-            own = change_designs(mechanism, single, shape)
-            one = _loaded(own, posture.with_axes(single), screws[index], load, counts_motors)
+            one_mechanism = change_designs(mechanism, single, shape)
+            found = _loaded_posture(one_mechanism, posture.with_axes(single), screws[index], load, counts_motors)
         except LoadError as error:
             refused = refused if isinstance(error, EquilibriumError) else error
             changed.status[index] = NO_EQUILIBRIUM
@@ -86,16 +87,21 @@ def loaded_postures(
                 array[index] = np.nan
             continue
         for name in ("position", "angles", "mass_matrix", "jacobian", "angular_jacobian"):
-            getattr(changed, name)[index] = getattr(one, name)
-        if changed.rotation is not None and one.rotation is not None:
-            changed.rotation[index] = one.rotation
+            getattr(changed, name)[index] = getattr(found, name)
+        if changed.rotation is not None and found.rotation is not None:
+            changed.rotation[index] = found.rotation
     if refused is not None and not np.any(changed.status == OK):
         raise refused
     return changed
 
 
-def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool) -> Posture:
-    """The posture of one design under load."""
+def _loaded_posture(
+    mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool
+) -> Posture:
+    """The posture under load of one design, whose posture without load is given.
+
+    Raises  EquilibriumError, LoadError  where there is none
+    """
     balances, at = _Balances(mechanism, screw, load, counts_motors), posture
     for _ in range(ROUNDS):  # each of the three hangs on the others by the load's own small changes
         before = at.angles
@@ -106,7 +112,7 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
         elif mechanism.flexible:
             at = _ahead_of_bending(mechanism, posture, at, balances)
         if load.settle:
-            at = _settled(mechanism, at, screw, load, balances)
+            at = _slid(mechanism, at, screw, load, balances)
         if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
             break
     else:
@@ -123,25 +129,26 @@ class _Balances:
     """The equilibria of the postures that a search passes through, each looked for from the one before."""
 
     def __init__(self, mechanism: Mechanism, screw: Floats, load: Load, counts_motors: bool) -> None:
+        """Begin without any; arguments as of `loaded_postures`, of one design and one direction."""
         self.mechanism, self.screw, self.load, self.counts_motors = mechanism, screw, load, counts_motors
         self.last: tuple[Posture, Balance, Equilibrium] | None = None
 
     def solve(self, posture: Posture) -> Equilibrium:
         """The equilibrium of a posture of the links. Raises what `Balance.solve` raises."""
-        return self._of(posture)[1]
+        return self._balance_of(posture)[1]
 
     def check(self, posture: Posture) -> Equilibrium:
         """The equilibrium of a posture. Raises what `Balance.check` raises where it is not held."""
-        balance, found = self._of(posture)
+        balance, found = self._balance_of(posture)
         balance.check(found)
         return found
 
     def scale(self, posture: Posture) -> float:
         """The largest generalised force of a posture, see `Balance.largest_part`."""
-        balance, found = self._of(posture)
+        balance, found = self._balance_of(posture)
         return balance.largest_part(found)
 
-    def _of(self, posture: Posture) -> tuple[Balance, Equilibrium]:
+    def _balance_of(self, posture: Posture) -> tuple[Balance, Equilibrium]:
         """Balance and equilibrium of a posture, looked for from the last one; kept until another posture comes."""
         if self.last is not None and self.last[0] is posture:
             return self.last[1:]
@@ -155,8 +162,8 @@ class _Balances:
 
 
 def _behind_motors(mechanism: Mechanism, asked: Posture, at: Posture, balances: _Balances) -> Posture:
-    """The links' posture where the motors count the one that is asked for: behind it by the bending of the
-    drives."""
+    """The links' posture, searched for from `at`, where the motors count the one that is asked for: behind it by
+    the bending of the drives."""
     k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
         found = balances.solve(at)
@@ -172,7 +179,8 @@ def _behind_motors(mechanism: Mechanism, asked: Posture, at: Posture, balances: 
 
 
 def _ahead_of_bending(mechanism: Mechanism, asked: Posture, at: Posture, balances: _Balances) -> Posture:
-    """The links' posture, as if they were rigid, in which their bending has the handle where it is asked for."""
+    """The links' posture, as if they were rigid, in which their bending has the handle where it is asked for;
+    searched for from `at`."""
     k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
         found = balances.solve(at)
@@ -186,14 +194,18 @@ def _ahead_of_bending(mechanism: Mechanism, asked: Posture, at: Posture, balance
     raise EquilibriumError("no posture was found in which the bent links have the handle where it is asked for")
 
 
-def _settled(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balances: _Balances) -> Posture:
-    """The posture, with its handle on the same surface, in which the load as it is given is in balance."""
+def _slid(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balances: _Balances) -> Posture:
+    """The posture, with its handle on the same plane across the direction, in which the load as it is given is in
+    balance.
+
+    Raises  EquilibriumError  where none is found near `at`;   LoadError  for another handle or direction
+    """
     assert load.force is not None
     if mechanism.controls != POSITION or not np.any(screw[:3]) or np.any(screw[3:]):
         raise LoadError("settle is for loads on a handle whose position the drives control; leave it out")
     k, u, force = len(mechanism.driven), screw[:3], load.force
-    motions = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
-    reached = motions[0][:, motions[1] > 1e-9 * motions[1][0]]
+    ways, sizes, _ = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
+    reached = ways[:, sizes > 1e-9 * sizes[0]]
     across = reached @ np.linalg.svd((u @ reached)[None])[2][1:].T  # the ways along the surface
     size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
     start = balances.solve(at).handle_place
@@ -203,19 +215,19 @@ def _settled(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balan
         found = balances.solve(there)
         return np.append(across.T @ (found.hand_force - force) / strength, u @ (found.handle_place - start) / size)
 
-    found = _newton(mechanism, at, off, np.arange(k), SETTLED)
+    found = _find_posture(mechanism, at, off, np.arange(k), SETTLED)
     if found is None:
-        left = balances.solve(at).hand_force - force
+        unbalanced = balances.solve(at).hand_force - force
         raise EquilibriumError(
             f"no posture was found near this one in which the load alone is in balance: here the hand has to "
-            f"supply {float(np.linalg.norm(across.T @ left)):.4g} N more across the direction; leave settle out, "
-            "which keeps the posture and lets the hand supply it"
+            f"supply {float(np.linalg.norm(across.T @ unbalanced)):.4g} N more across the direction; leave "
+            "settle out, which keeps the posture and lets the hand supply it"
         )
     return found
 
 
 def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
-    """The posture with free joints where gravity, their springs and the load leave them."""
+    """The posture with the drives of `at` and free joints where gravity, their springs and the load leave them."""
     k, count = len(mechanism.driven), len(mechanism.free)
     # the same in every posture, so that what is searched for are forces
     scale = balances.scale(at) or 1.0
@@ -232,7 +244,7 @@ def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
             f"where the free ball joint {names[0]!r} would hang under this load is not searched for; place its "
             "centre of mass at the joint, or leave gravity out"
         )
-    found = _newton(mechanism, at, off, np.arange(k, k + count), SETTLED, downhill=True)
+    found = _find_posture(mechanism, at, off, np.arange(k, k + count), SETTLED, downhill=True)
     if found is None:
         raise EquilibriumError(
             f"no place was found where the free joint {names[0]!r} is in balance under this load; give it a "
@@ -241,7 +253,7 @@ def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
     return found
 
 
-def _newton(
+def _find_posture(
     mechanism: Mechanism,
     at: Posture,
     off: Callable[[Posture], Floats],
@@ -250,9 +262,10 @@ def _newton(
     *,
     downhill: bool = False,
 ) -> Posture | None:
-    """The posture near `at` in which `off` (m,) is 0, as m of the independent coordinates move; None if there is
-    none to be found.
+    """The posture near `at` in which off(posture) (m,) is 0, by Newton's method; None where it does not get there.
 
+    moved     (m,)  indices of the independent coordinates that move
+    settled   size of `off` that counts as 0
     downhill  off are the forces on these coordinates: they are followed as far as it takes, to where they hold
     """
     c = at.jacobian.shape[-1]
@@ -270,7 +283,7 @@ def _newton(
                 for i in moved
             ]
             change, step = np.array(columns).T, np.zeros(c)
-            step[moved] = _downhill(change, value) if downhill else -np.linalg.solve(change, value)
+            step[moved] = _downhill_step(change, value) if downhill else -np.linalg.solve(change, value)
             if not (downhill or np.max(np.abs(step)) < LARGEST_STEP):
                 return None
             at = _moved(mechanism, at, step)
@@ -279,7 +292,7 @@ def _newton(
     return None
 
 
-def _downhill(change: Floats, forces: Floats) -> Floats:
+def _downhill_step(change: Floats, forces: Floats) -> Floats:
     """Newton's step (m,) where the forces (m,) hold against small motions, else one along them that is as large as
     their stiffness would have it with the other sign; none longer than LARGEST_STEP.
 
@@ -294,7 +307,10 @@ def _downhill(change: Floats, forces: Floats) -> Floats:
 
 
 def _moved(mechanism: Mechanism, at: Posture, step: Floats) -> Posture:
-    """The posture after a step (c,) of the independent coordinates."""
+    """The posture after a step (c,) of the independent coordinates.
+
+    Raises  EquilibriumError  where the loops cannot follow
+    """
     mech, c = pack(mechanism), len(step)
     angles = moved_posture(mech, at.angles, step)
     if angles is None:
@@ -323,7 +339,8 @@ def _describe(
     position: Floats,
     turn: Floats,
 ) -> None:
-    """Fill in mass matrix (1, c, c), Jacobians, and place of the handle at joint coordinates (n,)."""
+    """Fill in, at joint coordinates (n,), the mass matrix (1, c, c), the handle's Jacobians (1, 3, c), its
+    position (3,) and its axes `turn` (3, 3)."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
@@ -358,7 +375,7 @@ def linearise(
 ) -> LoadedPlants:
     """The full model of one design in one posture at its equilibrium.
 
-    mechanism  that of the equilibrium
+    mechanism, posture  those of the equilibrium;   damping, encoders  as of `reduce_mechanism`
     """
     axis = equilibrium.screw
     drives = mechanism.drives
@@ -369,6 +386,8 @@ def linearise(
     unloaded = reduce_mechanism(bent, posture, axis, "full", damping, encoders)
     c, n = equilibrium.motions.count, unloaded.size
     flexible = equilibrium.springs.flexible
+    # the drives' coordinates per coordinate of the plant (d, n): at the joints, at the motors, where they are
+    # counted
     links = np.concatenate([equilibrium.drives.T, np.zeros((len(tangent), n - c))], axis=1)
     motors = links.copy()
     motors[flexible] = np.eye(n)[c:]
@@ -376,9 +395,10 @@ def linearise(
     K = np.zeros((n, n))
     K[:c, :c] = _links_stiffness(equilibrium)
     seen, k = equilibrium.counted, len(mechanism.driven)
+    # torques of the drives per generalised force on the driven coordinates (d, k)
     share = np.asarray(np.linalg.pinv(seen.drives.T[:, :k].T), dtype=np.float64)
     h = seen.motions.handle_along(axis)[:k]
-    symmetric, turning = _parts(K)
+    symmetric, turning = _symmetric_parts(K)
     backward = equilibrium.load.branch == "backward"
     parts = nonlinear_of_drives(drives, h @ seen.seen, links, motors, counted, equilibrium.deflections, backward)
     loaded = replace(
@@ -395,21 +415,24 @@ def linearise(
     return LoadedPlants(loaded, unloaded)
 
 
-def _parts(K: Floats) -> tuple[Floats, Floats | None]:
+def _symmetric_parts(K: Floats) -> tuple[Floats, Floats | None]:
     """The symmetric and the antisymmetric part of a stiffness (n, n); None where the second is rounding."""
     symmetric, turning = 0.5 * (K + K.T), 0.5 * (K - K.T)
     return symmetric, turning if np.any(np.abs(turning) > ROUNDING * np.max(np.abs(K), initial=0.0)) else None
 
 
 def _force_left(mechanism: Mechanism, equilibrium: Equilibrium, share: Floats) -> float:
-    """By how much the wall's force may change before a motor is at its limit [N]."""
+    """By how much the wall's force may change before a motor is at its limit [N]; inf without one.
+
+    share  (d,)  of the drives' torques at the joints, per newton of the wall's force
+    """
     drives, used = mechanism.drives, share != 0.0
     left = drives.transmission * drives.torque_limit - np.abs(equilibrium.torques)
     return float(np.min(left[used] / np.abs(share[used]), initial=np.inf))
 
 
 def _links_stiffness(equilibrium: Equilibrium) -> Floats:
-    """-dQ/dp (c, c) of hand, gravity and drives' torques on the links."""
+    """Stiffness -dQ/dp (c, c) of the generalised forces Q of hand, gravity and drives' torques on the links."""
     handle, drives, load = equilibrium.motions.handle, equilibrium.drives, equilibrium.load
     felt = 0.0 if load.hand == "neglected" else 1.0
     force, moment = felt * equilibrium.hand_force, felt * equilibrium.hand_moment
@@ -433,22 +456,31 @@ def _links_stiffness(equilibrium: Equilibrium) -> Floats:
 def _sampled_forces(
     equilibrium: Equilibrium, share: Floats, motors: Floats, counted: Floats
 ) -> tuple[SampledForce, ...]:
-    """What the computer adds: the turning torques, and those of the surface's curvature."""
+    """What the computer adds to its torques as the device moves: that they turn, and that the surface is curved.
+
+    share            (d, k)  torques of the drives per generalised force on the driven coordinates
+    motors, counted  (d, n)  the drives' coordinates at the motors, and as they are counted, per coordinate of the
+                             plant
+    """
     load, seen, u = equilibrium.load, equilibrium.counted, equilibrium.screw
     gravity = np.zeros(3) if equilibrium.compensation == "counterweight" else load.weight
     turning = command_change(seen, u, gravity, equilibrium.compensation, equilibrium.wall_force)
-    forces = _rank_one(turning, motors, counted, False)
+    forces = _rank_one_forces(turning, motors, counted, False)
     if isfinite(load.surface_radius):
         k = seen.seen.shape[0]
+        # the normal, and with it the wall's force, turns by 1/R per way across the direction
         across = seen.motions.handle.speed[:, :k]
         across = across - np.outer(u[:3], u[:3] @ across)
         curved = abs(equilibrium.wall_force) / load.surface_radius * (share @ (across.T @ across) @ seen.seen)
-        forces += _rank_one(curved, motors, counted, True)
+        forces += _rank_one_forces(curved, motors, counted, True)
     return forces
 
 
-def _rank_one(change: Floats, motors: Floats, counted: Floats, filtered: bool) -> tuple[SampledForce, ...]:
-    """A feedback (d, d) from counted coordinates to motors, as products of one column and one row each."""
+def _rank_one_forces(change: Floats, motors: Floats, counted: Floats, filtered: bool) -> tuple[SampledForce, ...]:
+    """A feedback (d, d) from counted coordinates to motors' torques, as products of one column and one row each.
+
+    motors, counted (d, n), as of `_sampled_forces`;   filtered  as of `SampledForce`
+    """
     left, size, right = np.linalg.svd(change)
     kept = np.flatnonzero(size > ROUNDING * np.max(size, initial=0.0))
     return tuple(SampledForce(left[:, i] @ motors, size[i] * (right[i] @ counted), filtered) for i in kept)
@@ -463,8 +495,10 @@ def set_apart(plants: LoadedPlants) -> Plant:
     """
     moved, still = moved_motions(plants.unloaded)
     if not len(still.squared):
-        return _on(plants, moved)
-    return replace(_on(plants, moved), apart=_giving_way(_on(plants, still), plants, moved, still.shapes))
+        return _on_modes(plants, moved)
+    return replace(
+        _on_modes(plants, moved), apart=_giving_way(_on_modes(plants, still), plants, moved, still.shapes)
+    )
 
 
 def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: Floats) -> Plant:
@@ -492,24 +526,24 @@ def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: 
     change = -(still.T @ added @ ways @ np.linalg.lstsq(bordered, pushed, rcond=None)[0][:-1])
     if apart.circulatory is not None:
         change = change + apart.circulatory
-    symmetric, turning = _parts(change)
+    symmetric, turning = _symmetric_parts(change)
     return replace(apart, stiffness=apart.stiffness + symmetric, circulatory=turning)
 
 
 def counting_all(plants: LoadedPlants) -> Plant:
     """The loaded plant on all its modes without load, those that no wall moves among them."""
     squared, V = undamped_modes(plants.unloaded.mass, plants.unloaded.stiffness)
-    return _on(plants, ModalMotions(V, squared))
+    return _on_modes(plants, ModalMotions(V, squared))
 
 
-def _on(plants: LoadedPlants, motions: ModalMotions) -> Plant:
-    """The loaded plant on some modes of the unloaded one. Their own mass and stiffness are exact: of a free motion
-    the stiffness is 0, so that what the load adds keeps its digits."""
+def _on_modes(plants: LoadedPlants, motions: ModalMotions) -> Plant:
+    """The loaded plant on some mass-normalised modes of the unloaded one. Their own mass and stiffness are exact:
+    of a free motion the stiffness is 0, so that what the load adds keeps its digits."""
     Z = motions.shapes
     added = Z.T @ (plants.loaded.stiffness - plants.unloaded.stiffness) @ Z
-    own, mass = np.diag(motions.squared), np.eye(len(motions.squared))
-    bare = replace(plants.unloaded.on_motions(Z), mass=mass, stiffness=own)
-    return replace(plants.loaded.on_motions(Z), mass=mass, stiffness=own + added, without_load=bare)
+    modal_stiffness, mass = np.diag(motions.squared), np.eye(len(motions.squared))
+    bare = replace(plants.unloaded.on_motions(Z), mass=mass, stiffness=modal_stiffness)
+    return replace(plants.loaded.on_motions(Z), mass=mass, stiffness=modal_stiffness + added, without_load=bare)
 
 
 class ModalMotions(NamedTuple):
@@ -530,6 +564,7 @@ def moved_motions(plant: Plant) -> tuple[ModalMotions, ModalMotions]:
     drag = drag / max(float(np.max(np.abs(drag))), np.finfo(float).tiny)
     pushed = (V.T @ plant.actuator)[:, None]
     pushed = pushed / np.linalg.norm(pushed)
+    # what the force moves at each frequency, widened by what the damping of what is moved pushes, until it stays
     moved = np.zeros((plant.size, 0))
     while True:
         reached = np.hstack([pushed, drag @ moved])

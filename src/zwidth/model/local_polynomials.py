@@ -71,21 +71,24 @@ class Fits:
     freedom: Floats
 
     def at(self, tile: Ints, r: Floats) -> tuple[Complexes, Floats]:
-        """G (n,) and its variance (n,) for noise of variance 1, at places r (n,) of tiles (n,)."""
+        """G (n,) and its variance (n,) for noise of variance 1, at places r (n,) of tiles (n,), given by
+        numbers."""
         powers = r[:, None] ** np.arange(ORDER + 1)
         value = np.sum(self.coefficients[tile] * powers, axis=1)
         spread = np.einsum("ni,nij,nj->n", powers, self.factor[tile], powers).real
         return value, np.maximum(spread, 0.0)
 
     def curvature(self, tile: Ints, r: Floats) -> Floats:
-        """Squared difference (n,) that one more term makes at places r (n,) of tiles (n,)."""
+        """Squared difference (n,) that one more term makes to G at places r (n,) of tiles (n,), given by
+        numbers."""
         value, _ = self.at(tile, r)
         longer = np.sum(self.cubic[tile] * r[:, None] ** np.arange(self.cubic.shape[1]), axis=1)
         return np.asarray(np.abs(longer - value) ** 2)
 
 
 def fit_tiles(U: Complexes, Y: Complexes, width: int) -> Fits:
-    """Polynomials over all tiles of `width` spacings from the second value of both transforms on."""
+    """Polynomials over all tiles of `width` spacings of transforms (k,) of what was sent and read, U and Y, from
+    their second value on."""
     middles = np.arange(1 + width // 2, len(U) - 1 + width // 2, width)
     size = 2 * width + 1
     chunk = max(1, CHUNK // (size * TERMS))
@@ -97,7 +100,8 @@ def fit_tiles(U: Complexes, Y: Complexes, width: int) -> Fits:
 def _fit_windows(
     U: Complexes, Y: Complexes, middles: Ints, width: int
 ) -> tuple[Complexes, Complexes, Complexes, Floats, Floats]:
-    """Coefficients, their covariance, those with one more term, variance of the noise and mean |U|^2."""
+    """The first five arrays of `Fits` after its width, of windows of `width` spacings to either side of middles
+    (n,): coefficients, factor, cubic, noise and excited."""
     starts = np.clip(middles - width, 1, len(U) - 1 - 2 * width)
     index = starts[:, None] + np.arange(2 * width + 1)
     r = (index - middles[:, None]) / width
@@ -108,12 +112,12 @@ def _fit_windows(
     coefficients, rows = _solution(R, ORDER)
     cubic, _ = _solution(R, ORDER + 1)
     rows = rows / scale[:, :, None]
-    left = np.sum(np.abs(R[:, TERMS:, -1]) ** 2, axis=1)
+    residual = np.sum(np.abs(R[:, TERMS:, -1]) ** 2, axis=1)
     return (
         coefficients / scale,
         rows @ np.conj(np.swapaxes(rows, 1, 2)),
         cubic / scale,
-        left / (2 * width + 1 - TERMS),
+        residual / (2 * width + 1 - TERMS),
         excited,
     )
 
@@ -134,12 +138,14 @@ def _triangle(u: Complexes, y: Complexes, r: Floats) -> Complexes:
 
 
 def _solution(R: Complexes, order: int) -> tuple[Complexes, Complexes]:
-    """Coefficients (n, order + 1) of G, and their rows of the inverse equations, from `_triangle`."""
+    """Coefficients (n, order + 1) of G by polynomials of an order, from the R of `_triangle`; and their rows
+    (n, order + 1, 2 order + 2) of the inverse of R, whose products with each other are their covariance."""
     count = 2 * (order + 1)
     block, at = R[:, :count, :count].copy(), np.arange(count)
     # a window without force, or with one that cannot be told from the record's ends, has a vast error
     least = 1e-9 * np.max(np.abs(block[:, at, at]), axis=1)[:, None] + 1e-300
     block[:, at, at] = np.where(np.abs(block[:, at, at]) < least, least, block[:, at, at])
+    # G's coefficients are every other one, beginning with the first
     rows: Complexes = np.asarray(np.linalg.inv(block)[:, ::2], dtype=np.complex128)
     return np.asarray(np.einsum("nij,nj->ni", rows, R[:, :count, -1])), rows
 
@@ -188,7 +194,7 @@ def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> Local
     levels = [_with_floor(one, floor) for one in fits]
     count = len(levels[0].noise)
     level = np.zeros(count, dtype=np.int64)  # of the window that each of the narrowest tiles goes with
-    whole = np.ones(count, dtype=bool)
+    whole = np.ones(count, dtype=bool)  # whether a window of the level, and all within it, has not been given up
     for n in range(1, len(levels)):
         apart = _fit_difference(levels[n - 1], levels[n])
         halves = np.append(whole, True)[: 2 * len(apart)]  # the last may have one half only
@@ -198,6 +204,7 @@ def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> Local
     result = LocalResponse(np.empty(len(places), complex), *np.empty((4, len(places))))
     for n, one in enumerate(levels):
         at = np.flatnonzero(level[tile] == n)
+        # of the windows of this level that hold these tiles
         numbers = np.minimum(tile[at] // 2**n, len(one.noise) - 1)
         r = (places[at] - (1 + one.width * numbers + one.width // 2)) / one.width
         value, spread = one.at(numbers, r)
@@ -211,7 +218,7 @@ def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> Local
 
 
 def _with_floor(fits: Fits, floor: Floats) -> Fits:
-    """The fits with a noise of at least `floor`."""
+    """The fits with a noise of at least `floor` (k,), which is given for each spacing of the transforms."""
     middles = np.minimum(1 + fits.width * np.arange(len(fits.noise)) + fits.width // 2, len(floor) - 1)
     return replace(fits, noise=np.maximum(fits.noise, floor[middles]))
 
@@ -224,10 +231,11 @@ def _fit_difference(narrow: Fits, wide: Fits) -> Floats:
     apart = np.where(wide.width <= WIDEST_SHARE * middles, 0.0, np.inf)
     halves = np.minimum(2 * np.arange(count)[:, None] + [0, 1], len(narrow.noise) - 1)
     noise = np.mean(narrow.noise[halves], axis=1)
-    for own in halves.T:
+    for half in halves.T:
         for r in (-0.25, 0.25):
-            value, spread = narrow.at(own, np.full(count, r))
-            k = 1 + narrow.width * own + narrow.width // 2 + r * narrow.width
+            value, spread = narrow.at(half, np.full(count, r))
+            # the same place, in spacings of the transform
+            k = 1 + narrow.width * half + narrow.width // 2 + r * narrow.width
             predicted, _ = wide.at(np.arange(count), (k - middles) / wide.width)
             allowed = spread * noise + (TOLERANCE * np.abs(value)) ** 2 / AGREED
             apart = np.maximum(apart, np.abs(predicted - value) ** 2 / np.maximum(allowed, 1e-300))
@@ -289,37 +297,44 @@ class PieceSums:
                     triangles, power, filled = (
                         np.concatenate([one, np.zeros_like(one[:1])]) for one in (triangles, power, filled)
                     )
-                triangles = _reduced([triangles[k::2] @ _moved(0.5 * (2 * k - 1), 0.5) for k in range(2)])
+                triangles = _reduced([triangles[k::2] @ _to_window(0.5 * (2 * k - 1), 0.5) for k in range(2)])
                 power, filled = (one.reshape(-1, 2).sum(axis=1) for one in (power, filled))
             found.append(self._windows(triangles, power, filled, width, most))
         return found
 
     def _windows(self, pieces: Complexes, power: Floats, filled: Floats, width: int, most: float) -> Fits:
-        """Windows of four pieces each.
+        """The fits over windows of four pieces each, two pieces apart.
 
+        pieces (n, 5, 5)  triangles of the equations of each piece
         power  (n,) of u;   filled (n,) narrowest pieces in each;   most  power in any of the narrowest pieces
         """
         tile = np.arange((len(pieces) + 1) // 2)
-        first = np.clip(2 * tile - 1, 0, len(pieces) - PIECES)
-        about = [0.5 * (first + j) - tile - 0.25 - 0.5 / width for j in range(PIECES)]
-        R = _reduced([pieces[first + j] @ _moved(middle, 0.25) for j, middle in enumerate(about)])
+        first_piece = np.clip(2 * tile - 1, 0, len(pieces) - PIECES)
+        # of the four pieces, as r in the window
+        middles = [0.5 * (first_piece + j) - tile - 0.25 - 0.5 / width for j in range(PIECES)]
+        R = _reduced([pieces[first_piece + j] @ _to_window(middle, 0.25) for j, middle in enumerate(middles)])
         least = UNEXCITED * np.sqrt(most)
         coefficients, rows = _summed_solution(R, ORDER + 1, least)
         cubic, _ = _summed_solution(R, ORDER + 2, least)
-        together, powers = (np.sum([one[first + j] for j in range(PIECES)], axis=0) for one in (filled, power))
+        together, powers = (
+            np.sum([one[first_piece + j] for j in range(PIECES)], axis=0) for one in (filled, power)
+        )
         blocks = self._blocks * together
         freedom = blocks * (self._width - SUMMED_TERMS) - (ORDER + 1)
-        left = np.sum(np.abs(R[:, ORDER + 1 :, -1]) ** 2, axis=1)
+        residual = np.sum(np.abs(R[:, ORDER + 1 :, -1]) ** 2, axis=1)
         factor: Complexes = rows @ np.conj(np.swapaxes(rows, 1, 2))
-        return Fits(width, coefficients, factor, cubic, left / freedom, powers / (blocks * self._width), freedom)
+        return Fits(
+            width, coefficients, factor, cubic, residual / freedom, powers / (blocks * self._width), freedom
+        )
 
 
 def _reduced(stacked: list[Complexes]) -> Complexes:
-    """The triangles (n, 5, 5) of equations that stand under each other."""
+    """The triangles (n, 5, 5) of n sets of equations, each stacked from arrays (n, r, 5) whose rows stand below
+    each other."""
     return np.asarray(np.linalg.qr(np.concatenate(stacked, axis=1), mode="r"), dtype=np.complex128)
 
 
-def _moved(middle: ArrayLike, half: float) -> Floats:
+def _to_window(middle: ArrayLike, half: float) -> Floats:
     """Matrix (n, 5, 5) that turns columns u R^p of a piece into u r^p of a window, where r = middle + half R:
     r^p = sum over q of (p over q) middle^(p - q) half^q R^q."""
     q, p = np.arange(SUMMED_TERMS)[:, None], np.arange(SUMMED_TERMS)
@@ -331,8 +346,9 @@ def _moved(middle: ArrayLike, half: float) -> Floats:
 
 
 def _summed_solution(R: Complexes, count: int, least: float) -> tuple[Complexes, Complexes]:
-    """So many coefficients of G (n, count), and the inverse (n, count, count) of their equations; where the force
-    tells nothing its size is taken as `least`, which leaves a vast error."""
+    """The first `count` coefficients of G (n, count), from triangles R (n, 5, 5), and the inverse (n, count,
+    count) of their equations; where the force tells nothing its size is taken as `least`, which leaves a vast
+    error."""
     block, at = R[:, :count, :count].copy(), np.arange(count)
     floor = np.maximum(1e-9 * np.max(np.abs(block[:, at, at]), axis=1), least)[:, None]
     block[:, at, at] = np.where(np.abs(block[:, at, at]) < floor, floor, block[:, at, at])

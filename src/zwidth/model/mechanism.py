@@ -90,15 +90,19 @@ class RatioTable:
         coordinates (...) of one design; nan outside of the table."""
         q, inside = self._within(coordinate)
         c, x, span = self._cubic(q)
-        every = self._coefficients[:, 0]
+        cubics = self._coefficients[:, 0]
         steps = np.diff(self.coordinate)
-        passed = (((every[0] * steps / 4.0 + every[1] / 3.0) * steps + every[2] / 2.0) * steps + every[3]) * steps
+        # the integral of each whole span's cubic, and of all before; then that of the span begun
+        passed = (
+            ((cubics[0] * steps / 4.0 + cubics[1] / 3.0) * steps + cubics[2] / 2.0) * steps + cubics[3]
+        ) * steps
         before = np.concatenate([[0.0], np.cumsum(passed)])[span]
-        own = (((c[0] * x / 4.0 + c[1] / 3.0) * x + c[2] / 2.0) * x + c[3]) * x
-        return np.asarray(np.where(inside, before + own, np.nan))
+        in_span = (((c[0] * x / 4.0 + c[1] / 3.0) * x + c[2] / 2.0) * x + c[3]) * x
+        return np.asarray(np.where(inside, before + in_span, np.nan))
 
     def _within(self, coordinate: Floats) -> tuple[Floats, Flags]:
-        """Coordinates (...) moved into the table by whole turns, and whether they are in it."""
+        """Coordinates (...) moved into the table by whole turns, and whether they are in it then; those that are
+        not come back as its first entry."""
         q, low, high = np.asarray(coordinate, dtype=np.float64), self.coordinate[0], self.coordinate[-1]
         slack = ROUNDING * (high - low)
         if self.turns:
@@ -108,12 +112,14 @@ class RatioTable:
         return np.where(inside, np.clip(q, low, high), low), inside
 
     def _cubic(self, q: Floats) -> tuple[Floats, Floats, Ints]:
-        """Coefficients (4, ...) of the cubic at each coordinate (...), the way into its span, and the span."""
+        """Of each coordinate (...) within the table: coefficients (4, ...) of its span's cubic, highest power
+        first, the way into the span (...), and the index of the span (...)."""
         span = np.clip(np.searchsorted(self.coordinate, q, side="right") - 1, 0, len(self.coordinate) - 2)
         return self._coefficients[:, self._design(q.shape), span], q - self.coordinate[span], span
 
     def _design(self, shape: tuple[int, ...]) -> Ints:
-        """Index of the design for each of coordinates of a shape, broadcast with the axes of the designs."""
+        """Index of the design for each coordinate of an array of a shape, broadcast with the axes of the
+        designs."""
         designs = self.ratio.shape[:-1]
         numbers = np.arange(int(np.prod(designs))).reshape(designs)
         return np.broadcast_to(numbers, np.broadcast_shapes(designs, shape))
@@ -145,8 +151,8 @@ def with_any_ratio(drives: Drives) -> Drives:
 
 def _with_ratios(drives: Drives, ratios: list[Floats | None]) -> Drives:
     """The drives with ratios (...) in place of their tables; where a ratio is None, that of the drive stays."""
-    own = drives.transmission
-    columns = [own[..., i] if ratio is None else ratio for i, ratio in enumerate(ratios)]
+    given = drives.transmission
+    columns = [given[..., i] if ratio is None else ratio for i, ratio in enumerate(ratios)]
     return replace(drives, transmission=np.stack(np.broadcast_arrays(*columns), axis=-1), ratio_tables=None)
 
 
@@ -326,6 +332,7 @@ class ModalDamping:
     ratio: Number
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a ratio that is not finite or below 0."""
         _check_coefficient("damping ratio", self.ratio)
 
 
@@ -337,6 +344,7 @@ class ProportionalDamping:
     stiffness_coefficient_s: Number
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a coefficient that is not finite or below 0."""
         _check_coefficient("mass coefficient", self.mass_coefficient_1_per_s)
         _check_coefficient("stiffness coefficient", self.stiffness_coefficient_s)
 
@@ -350,6 +358,7 @@ Damping = ModalDamping | ProportionalDamping | GivenDamping
 
 
 def _check_coefficient(what: str, value: float) -> None:
+    """Raise ValueError unless the value, of one design or of several, is finite and at least 0."""
     if not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
         raise ValueError(f"the {what} must be a finite number of at least 0, got {value}")
 
@@ -415,7 +424,8 @@ def nonlinear_of_drives(
     bent: Floats | None = None,
     backward: bool = False,
 ) -> Nonlinear:
-    """All of it in a plant whose coordinates are joint angles.
+    """All nonlinear parts of the drives, and counters and the force limit, in a plant whose coordinates are joint
+    angles.
 
     friction     n C on the motor's coordinate, its bristles n^2 as stiff
     counters     2 pi/(N n) of what is counted, each weighed by h_i: their sum is the handle's reading h . counted
@@ -432,31 +442,31 @@ def nonlinear_of_drives(
     bent      (d,)  deflections of the springs under load;   backward  whether one that is not bent is tangent to
               the other branch; None: no load
     """
-    n, dry = drives.transmission, drives.nonlinearity
+    n, nonlinear = drives.transmission, drives.nonlinearity
     pulled = h != 0.0
     limits = n[pulled] * drives.torque_limit[pulled] / np.abs(h[pulled])
     return Nonlinear(
-        friction=() if dry is None else _friction(n, dry, motors),
+        friction=() if nonlinear is None else _friction(n, nonlinear, motors),
         counters=_counters(drives, h, encoders),
-        springs=() if dry is None else _springs(drives, dry, motors - links, bent, backward),
-        brakes=() if dry is None else _brakes(n, dry, motors),
+        springs=() if nonlinear is None else _springs(drives, nonlinear, motors - links, bent, backward),
+        brakes=() if nonlinear is None else _brakes(n, nonlinear, motors),
         force_limit=float(np.min(limits, initial=inf)),
     )
 
 
-def _friction(n: Floats, dry: DriveNonlinearity, motors: Floats) -> tuple[Friction, ...]:
+def _friction(n: Floats, nonlinear: DriveNonlinearity, motors: Floats) -> tuple[Friction, ...]:
     """Dry friction of the drives that have it; n (d,) ratios, motors (d, n) as in `nonlinear_of_drives`."""
     return tuple(
         Friction(
             along=motors[i],
-            coulomb=float(n[i] * dry.coulomb[i]),
-            model=dry.friction_model,
-            bristle_stiffness=float(n[i] ** 2 * dry.bristle_stiffness),
-            bristle_damping=float(n[i] ** 2 * dry.bristle_damping),
-            breakaway=float(n[i] * dry.breakaway[i]),
-            stribeck_velocity=float(dry.stribeck_velocity / n[i]),
+            coulomb=float(n[i] * nonlinear.coulomb[i]),
+            model=nonlinear.friction_model,
+            bristle_stiffness=float(n[i] ** 2 * nonlinear.bristle_stiffness),
+            bristle_damping=float(n[i] ** 2 * nonlinear.bristle_damping),
+            breakaway=float(n[i] * nonlinear.breakaway[i]),
+            stribeck_velocity=float(nonlinear.stribeck_velocity / n[i]),
         )
-        for i in np.flatnonzero(dry.coulomb > 0.0)
+        for i in np.flatnonzero(nonlinear.coulomb > 0.0)
     )
 
 
@@ -476,17 +486,17 @@ def _counters(drives: Drives, h: Floats, counted: Floats) -> tuple[Counter, ...]
 
 
 def _springs(
-    drives: Drives, dry: DriveNonlinearity, deflections: Floats, bent: Floats | None, backward: bool
+    drives: Drives, nonlinear: DriveNonlinearity, deflections: Floats, bent: Floats | None, backward: bool
 ) -> tuple[Spring, ...]:
     """What the drives' springs add to a constant stiffness; deflections (d, n): row i reads theta - phi of drive
     i, bent and backward as in `nonlinear_of_drives`."""
     n = drives.transmission
-    cubic = n**4 * dry.hardening
+    cubic = n**4 * nonlinear.hardening
     excess = np.zeros(len(n))
-    given = np.isfinite(dry.backward_stiffness)
-    excess[given] = n[given] ** 2 * (dry.backward_stiffness[given] - drives.stiffness[given])
+    given = np.isfinite(nonlinear.backward_stiffness)
+    excess[given] = n[given] ** 2 * (nonlinear.backward_stiffness[given] - drives.stiffness[given])
     offset = np.zeros(len(n)) if bent is None else bent
-    kink = kinks(drives, dry)
+    kink = kinks(drives, nonlinear)
     behind = (offset < kink) | ((offset == kink) & backward)
     curved = np.flatnonzero(np.isfinite(drives.stiffness) & ((cubic != 0.0) | (excess != 0.0)))
     return tuple(
@@ -502,16 +512,18 @@ def _springs(
     )
 
 
-def kinks(drives: Drives, dry: DriveNonlinearity) -> Floats:
+def kinks(drives: Drives, nonlinear: DriveNonlinearity) -> Floats:
     """Deflections (d,) at the joint, not positive, at which the drives' stiffness changes [rad]."""
     n = drives.transmission
-    preloaded = np.isfinite(drives.stiffness) & (dry.preload > 0.0)
-    return np.asarray(np.where(preloaded, -dry.preload / (n * np.where(preloaded, drives.stiffness, 1.0)), 0.0))
+    preloaded = np.isfinite(drives.stiffness) & (nonlinear.preload > 0.0)
+    return np.asarray(
+        np.where(preloaded, -nonlinear.preload / (n * np.where(preloaded, drives.stiffness, 1.0)), 0.0)
+    )
 
 
-def _brakes(n: Floats, dry: DriveNonlinearity, motors: Floats) -> tuple[Brake, ...]:
+def _brakes(n: Floats, nonlinear: DriveNonlinearity, motors: Floats) -> tuple[Brake, ...]:
     """Electrical brakes of the drives that have one; n (d,) ratios, motors (d, n) as in `nonlinear_of_drives`."""
     return tuple(
-        Brake(motors[i], float(n[i] ** 2 * dry.brake_damping[i]), float(dry.brake_time_constant[i]))
-        for i in np.flatnonzero(dry.brake_damping > 0.0)
+        Brake(motors[i], float(n[i] ** 2 * nonlinear.brake_damping[i]), float(nonlinear.brake_time_constant[i]))
+        for i in np.flatnonzero(nonlinear.brake_damping > 0.0)
     )

@@ -18,6 +18,8 @@ from zwidth.model.mechanism import BALL_Z, FIXED, POINT, POSE, PRISMATIC, Links,
 class MechanismArrays(NamedTuple):
     """Topology shared by all designs, then the numbers of each of the P designs.
 
+    n links, m unknowns, c of them independent, k closures;
+
     parent          (n,)    parent link, -1 for the base
     kind            (n,)    FIXED, REVOLUTE, PRISMATIC, BALL_X, BALL_Y or BALL_Z: the link's joint
     carrier         (n,)    the link against which the joint turns: the parent; of a ball joint what carries all
@@ -95,7 +97,8 @@ NUMBERS: Final = MechanismArrays._fields[MechanismArrays._fields.index("origin")
 
 
 def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
-    """An array of the mechanism with its leading axes flattened to one axis of designs: (P, ...)."""
+    """A copy of an array of the mechanism with its leading axes, all but the last `trailing`, made one axis of the
+    P designs: (P, ...)."""
     shape = mechanism.design_shape
     tail = array.shape[array.ndim - trailing :]
     full = np.broadcast_to(np.asarray(array, dtype=np.float64), shape + tail)
@@ -105,8 +108,8 @@ def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
 
 def one_design(mech: MechanismArrays, design: int) -> MechanismArrays:
     """The arrays of a single design, which then is design 0."""
-    own = {name: getattr(mech, name)[design : design + 1].copy() for name in NUMBERS}
-    return mech._replace(**own)
+    taken = {name: getattr(mech, name)[design : design + 1].copy() for name in NUMBERS}
+    return mech._replace(**taken)
 
 
 def design_of_each(mechanism: Mechanism, shape: tuple[int, ...]) -> Ints:
@@ -170,7 +173,7 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
         handle_link=int(mechanism.handle_link),
         controls=int(mechanism.controls),
         origin=origin,
-        rotation_terms=_turning(rotation, axis),
+        rotation_terms=_rotation_terms(rotation, axis),
         axis=np.ascontiguousarray(np.einsum("pnij,pnj->pni", rotation, axis)),
         point_a=point_a,
         point_b=point_b,
@@ -198,7 +201,8 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
 
 
 def _to_drive(mechanism: Mechanism, independent: list[int]) -> Floats:
-    """The coordinates of drives and free joints per coordinate of the independent joints, (P, c, c)."""
+    """The coordinates of drives and free joints per coordinate of the independent joints (indices of links), (P,
+    c, c)."""
     c, drives = len(independent), mechanism.drives
     P = int(np.prod(mechanism.design_shape))
     T = np.tile(np.eye(c), (P, 1, 1))
@@ -224,7 +228,7 @@ def _rows_of_links(mechanism: Mechanism, first_row: Ints) -> Ints:
         while link >= 0:
             rows[link] = min(rows[link, 0], first), max(rows[link, 1], end)
             link = int(parent[link])
-    rows[rows[:, 1] == 0] = 0
+    rows[rows[:, 1] == 0] = 0  # a joint that moves no equation
     return rows
 
 
@@ -242,12 +246,13 @@ def _filled(spans: Ints) -> Ints:
 def _carriers(links: Links) -> Ints:
     """Index (n,) of the link against which each link's joint turns."""
     carrier = np.array(links.parent, dtype=np.int64)
+    # a ball joint is three links, i - 2 to i: all turn against the parent of the first
     for i in np.flatnonzero(np.asarray(links.joint) == BALL_Z):
         carrier[i - 1 : i + 1] = carrier[i - 2]
     return carrier
 
 
-def _turning(rotation: Floats, axis: Floats) -> Floats:
+def _rotation_terms(rotation: Floats, axis: Floats) -> Floats:
     """C0, C1, C2 (P, n, 3, 3, 3) of a joint's rotation C (a a^T + sin q [a]x + cos q (1 - a a^T)), by Rodrigues:
     `rotation` C (P, n, 3, 3) is that at q = 0, `axis` a (P, n, 3)."""
     along = axis[..., :, None] * axis[..., None, :]

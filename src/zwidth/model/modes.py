@@ -69,14 +69,14 @@ def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
     squared = np.where(np.abs(squared) <= RIGID * scale, 0.0, squared)
     while True:
         slow = among[np.abs(squared[among]) <= WIDE * scale]
-        own, rounding = _stiffness_and_rounding(stiffness, shapes[:, slow], fastest)
-        if len(slow) == len(among) or not np.any(np.abs(own) > 10.0 * rounding):
+        stiffness_of_slow, rounding = _stiffness_and_rounding(stiffness, shapes[:, slow], fastest)
+        if len(slow) == len(among) or not np.any(np.abs(stiffness_of_slow) > 10.0 * rounding):
             return squared, shapes
         fast = np.setdiff1d(among, slow)
-        # what rounding has left of the fast modes in the slow ones
-        left = (shapes[:, fast].T @ stiffness @ shapes[:, slow]) / squared[fast, None]
-        motions = shapes[:, slow] - shapes[:, fast] @ left
-        shapes[:, fast] += motions @ left.T
+        # what rounding has left of the fast modes in the slow ones, K-orthogonal to which they should be
+        remnant = (shapes[:, fast].T @ stiffness @ shapes[:, slow]) / squared[fast, None]
+        motions = shapes[:, slow] - shapes[:, fast] @ remnant
+        shapes[:, fast] += motions @ remnant.T
         relative = motions.T @ stiffness @ motions
         found, turned = np.linalg.eigh((relative + relative.T) / 2.0)
         shapes[:, slow] = motions @ turned
@@ -88,9 +88,9 @@ def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
 def _stiffness_and_rounding(stiffness: Floats, motions: Floats, fastest: float) -> tuple[Floats, Floats]:
     """v^T K v (k,) of mass-normalised motions (n, k), and what of it may be rounding: of the terms that it is a
     sum of, and of what is left in it of the fastest mode."""
-    own = np.einsum("ik,ik->k", motions, stiffness @ motions)
+    energy = np.einsum("ik,ik->k", motions, stiffness @ motions)
     terms = np.einsum("ik,ik->k", np.abs(motions), np.abs(stiffness) @ np.abs(motions))
-    return own, np.maximum(RIGID * terms, SMALLEST * fastest)
+    return energy, np.maximum(RIGID * terms, SMALLEST * fastest)
 
 
 def repeat_tolerance(squared: Floats) -> Floats:
@@ -124,7 +124,8 @@ def least_deforming_motion(plant: Plant) -> Floats:
 
 
 def clusters(values: Floats, tolerance: float | Floats) -> list[slice]:
-    """Runs of ascending values that lie within the tolerance, one or (n,) one each, of their neighbour."""
+    """Runs of ascending values (n,), each within the tolerance of its neighbour; tolerance is one, or one each
+    (n,)."""
     apart = np.diff(values) > np.broadcast_to(tolerance, values.shape)[1:]
     starts = [0, *(int(i) + 1 for i in np.flatnonzero(apart)), len(values)]
     return [slice(a, b) for a, b in pairwise(starts)]

@@ -132,22 +132,23 @@ class Motions:
         return self._at(self._links, link, local).in_coordinates(self.rates, self.rates_2)
 
     def _at(self, links: Mapping[int, Motion], link: int, local: Floats, fixed_at: Floats | None = None) -> Motion:
-        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to the station next to it,
-        or to another place, as what slides in a guide is to the guide's."""
+        """A point (3,) of a link's frame in all coordinates, by the motions of the links' frames in these. Of a
+        flexible link it is fixed to the station next to it, or next to another place, `fixed_at` (3,): what slides
+        in a guide is fixed to where the guide is."""
         if link < 0:
             return links[-1].at(local)
-        R, own = self.rotation[link], links[link]
+        R, frame = self.rotation[link], links[link]
         if link not in self.flexible:
-            return own.at(R @ local)
+            return frame.at(R @ local)
         beam, columns = self.flexible[link], self._columns(link)
         k = beam.station_of(local if fixed_at is None else fixed_at)
-        straight = own.at(R[:, 0] * beam.body.stations[k])
-        bent, turned = (np.zeros_like(own.speed) for _ in range(2))
+        straight = frame.at(R[:, 0] * beam.body.stations[k])
+        bent, turned = (np.zeros_like(frame.speed) for _ in range(2))
         bent[:, columns], turned[:, columns] = R @ beam.body.displacement[k], R @ beam.body.rotation[k]
-        bent_2, turned_2 = 2.0 * _cross_forms(own.spin, bent), _cross_forms(own.spin, turned)
-        at = (slice(None), columns, columns)
-        bent_2[at] += np.tensordot(R, beam.body.displacement_2[k], 1)
-        turned_2[at] += np.tensordot(R, beam.body.rotation_2[k], 1)
+        bent_2, turned_2 = 2.0 * _cross_forms(frame.spin, bent), _cross_forms(frame.spin, turned)
+        own_block = (slice(None), columns, columns)
+        bent_2[own_block] += np.tensordot(R, beam.body.displacement_2[k], 1)
+        turned_2[own_block] += np.tensordot(R, beam.body.rotation_2[k], 1)
         station = Motion(
             straight.position,
             straight.speed + bent,
@@ -159,8 +160,8 @@ class Motions:
 
     def _columns(self, link: int) -> slice:
         """Where a flexible link's coordinates stand among all coordinates."""
-        own, m = self.elastic[link], len(self.unknowns)
-        return slice(m + own.start, m + own.stop)
+        among_elastic, m = self.elastic[link], len(self.unknowns)
+        return slice(m + among_elastic.start, m + among_elastic.stop)
 
     @cached_property
     def handle(self) -> Motion:
@@ -202,6 +203,7 @@ class Motions:
             centre = self._at(self._links, int(link), place)
             speed, spin = centre.speed @ rates, R.T @ (centre.spin @ rates)
             M += mass * speed.T @ speed + spin.T @ inertia @ spin
+            # the beam's own, in its axes: velocity and angular velocity of its base, then its elastic coordinates
             if beam is not None:
                 moved = np.vstack([R.T @ base.speed @ rates, R.T @ base.spin @ rates, rates[self._columns(link)]])
                 M += moved.T @ beam.body.mass @ moved
@@ -216,7 +218,8 @@ class Motions:
         return symmetric(K)
 
     def _rigid_body(self, link: int) -> tuple[float, Floats, Floats]:
-        """Mass, centre and inertia of what of a link is rigid: all of it, or what a beam carries."""
+        """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m²] about it, of what of a link is rigid: all of it,
+        or of a flexible link what its beam carries."""
         beam = self.flexible.get(link)
         if beam is None:
             mech = self.mech
@@ -230,8 +233,8 @@ class Motions:
             mass, place, _ = self._rigid_body(int(link))
             first, second = mass * self.point(link, place).speed, mass * self.point(link, place).speed_2
             if (beam := self.flexible.get(int(link))) is not None:
-                own, own_2 = self._first_moment(int(link), beam)
-                first, second = first + own, second + own_2
+                of_beam, of_beam_2 = self._first_moment(int(link), beam)
+                first, second = first + of_beam, second + of_beam_2
             force += gravity @ first
             derivative += np.tensordot(gravity, second, 1)
         return force, derivative
@@ -268,10 +271,11 @@ class Motions:
             moved = self._at(links, p, self._local(p, self._origin[i]), mech.origin[0, i])
             # spin of what carries the joint: of a flexible parent its station there, of a ball joint its base
             carried.append(moved.spin if mech.carrier[i] == p else carried[-1])
-            own = np.zeros(m)
+            unit_rate = np.zeros(m)
             if u >= 0:
-                own[u] = 1.0
-            along, turned = np.outer(z, own), _cross_forms(carried[i], np.outer(z, own))
+                unit_rate[u] = 1.0
+            # what the joint adds: its axis per unit rate, and that axis as it turns with what carries it
+            along, turned = np.outer(z, unit_rate), _cross_forms(carried[i], np.outer(z, unit_rate))
             if mech.kind[i] == PRISMATIC:
                 links[i] = Motion(
                     moved.position, moved.speed + along, moved.spin, moved.speed_2 + 2.0 * turned, moved.spin_2
@@ -287,8 +291,8 @@ class Motions:
         return place if link < 0 else self.rotation[link].T @ (place - self._origin[link])
 
     def _independent(self) -> tuple[Floats, Floats]:
-        """B and B2 of all coordinates by the drives, free joints and elastic motions, on which they hang by the
-        closures."""
+        """B (m + e, c) and B2 (m + e, c, c): how all coordinates follow the drives, free joints and elastic
+        motions, by the closures."""
         mech, c, e = self.mech, self.joint_count, self.elastic_count
         m = len(mech.joint)
         passive = m - c
@@ -304,6 +308,7 @@ class Motions:
         # what the closures determine: the passive joints, and together with them the links' deformations
         hanging = np.concatenate([np.arange(passive), np.arange(m, m + e)]).astype(np.int64)
         if e:
+            # columns in units of like size, so that a rank can be told
             scale = np.concatenate([unit, self._elastic_scale()])
             rows = A[:, hanging] * scale
             _, size, right = np.linalg.svd(rows)
@@ -323,16 +328,16 @@ class Motions:
         would do work on the deformations in B2, and be a stiffness of the order of the load.
         """
         motions = B[:, self.joint_count :]
-        own = np.linalg.inv(self._stiffness_of(motions))
+        inverse_stiffness = np.linalg.inv(self._stiffness_of(motions))
         stress = np.zeros((motions.shape[1], *B2.shape[1:]))
         for link, beam in self.flexible.items():
             bent = self._columns(link)
             stress += np.tensordot((beam.body.stiffness @ motions[bent]).T, B2[bent], 1)
-        return np.asarray(B2 - np.tensordot(motions @ own, stress, 1))
+        return np.asarray(B2 - np.tensordot(motions @ inverse_stiffness, stress, 1))
 
     def _natural(self, motions: Floats) -> Floats:
-        """The natural modes (m + e, k) among as many motions in which no drive moves, the slowest first, of a mass
-        of 1."""
+        """The natural modes (m + e, k) that motions (m + e, k) in which no drive moves span, the slowest first, of
+        a mass of 1 each."""
         if not motions.shape[1]:
             return motions
         M, K = self._mass_of(motions), self._stiffness_of(motions)
@@ -381,14 +386,14 @@ class Motions:
 
 
 def _cross(forms: Floats, arm: Floats) -> Floats:
-    """Linear or quadratic forms (3, ...), crossed with an arm (3,)."""
+    """forms x arm: linear or quadratic forms (3, ...) in the coordinates, crossed with an arm (3,)."""
     x, y, z = arm
     turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
     return np.asarray((turn @ forms.reshape(3, -1)).reshape(forms.shape))
 
 
 def _cross_forms(a: Floats, b: Floats) -> Floats:
-    """The symmetric quadratic form (3, u, u) of (a u') x (b u')."""
+    """The symmetric quadratic form (3, u, u) in u' of (a u') x (b u'), with a and b (3, u)."""
     product = a[NEXT, :, None] * b[LAST, None, :] - a[LAST, :, None] * b[NEXT, None, :]
     return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))
 
@@ -401,9 +406,10 @@ def _place(mech: MechanismArrays, angles: Floats) -> tuple[Floats, Floats, Float
     return rotation, origin, axis
 
 
-# Fills in axes (n, 3, 3) and origin (n, 3) of every link, and its joint's axis (n, 3), at joint coordinates (n,).
 @compiled
 def _place_all(mech: MechanismArrays, angles: Floats, rotation: Floats, origin: Floats, axis: Floats) -> None:
+    """Fill axes (n, 3, 3) and origin (n, 3) of every link, and its joint's axis (n, 3), at joint coordinates
+    (n,)."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     rotation[:], origin[:], axis[:] = work.rotation, work.origin, work.axis

@@ -161,18 +161,24 @@ def reduce_directions(
             "'full'"
         )
     if model == "rigid":
-        slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
+        mass_damping = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
         W = decompose(posture.mass_matrix + np.diag(rotor), H).rendered_mass
         I = np.eye(len(H))
-        return MultiPlant(W, slip * W, np.zeros_like(W), I, I.copy(), I.copy(), _names("device", len(H)))
-    both = _two_masses(posture.mass_matrix, rotor, spring, damper, H, damping)
-    return _motor_side(both) if model == "motor-mass" else both
+        return MultiPlant(W, mass_damping * W, np.zeros_like(W), I, I.copy(), I.copy(), _names("device", len(H)))
+    two_sides = _two_sides(posture.mass_matrix, rotor, spring, damper, H, damping)
+    return _motor_side(two_sides) if model == "motor-mass" else two_sides
 
 
-def _two_masses(
+def _two_sides(
     link_mass: Floats, rotor: Floats, spring: Floats, damper: Floats, H: Floats, damping: Damping
 ) -> MultiPlant:
-    """W_r1 x1'' + K_e (x1 - x2) = s_h,  W_r2 x2'' + K_e (x2 - x1) = lambda              (thesis eq. 2.35)"""
+    """The two-mass plant of m directions, link sides x1 and then motor sides x2:
+
+        W_r1 x1'' + K_e (x1 - x2) = s_h,  W_r2 x2'' + K_e (x2 - x1) = lambda              (thesis eq. 2.35)
+
+    link_mass              (d, d)  mass matrix of the links
+    rotor, spring, damper  (d,)    of the drives, at the joints;   H (m, d)  lever arms
+    """
     m = len(H)
     compliance = (H / spring) @ H.T
     if not np.linalg.matrix_rank(compliance, hermitian=True) == m:
@@ -194,21 +200,21 @@ def _two_masses(
     else:
         X = (H / spring).T @ K_e
         B = np.kron(between, X.T @ (damper[:, None] * X))
-    I, none = np.eye(m), np.zeros((m, m))
-    at_motor, at_link = np.hstack([none, I]), np.hstack([I, none])
+    I, zeros = np.eye(m), np.zeros((m, m))
+    at_motor, at_link = np.hstack([zeros, I]), np.hstack([I, zeros])
     names = _names("link side", m) + _names("motor side", m)
     return MultiPlant(M, B, K, at_motor, at_motor.copy(), at_link, names)
 
 
-def _motor_side(both: MultiPlant) -> MultiPlant:
-    """The motor side's block, the link side held fixed."""
-    m = both.count
-    M, B, K = (matrix[m:, m:] for matrix in (both.mass, both.damping, both.stiffness))
-    return MultiPlant(M, B, K, np.eye(m), np.eye(m), None, both.names[m:])
+def _motor_side(two_sides: MultiPlant) -> MultiPlant:
+    """The motor side's half of a plant of `_two_sides`, the link side held fixed."""
+    m = two_sides.count
+    M, B, K = (matrix[m:, m:] for matrix in (two_sides.mass, two_sides.damping, two_sides.stiffness))
+    return MultiPlant(M, B, K, np.eye(m), np.eye(m), None, two_sides.names[m:])
 
 
 def _names(what: str, count: int) -> tuple[str, ...]:
-    """One name per direction, numbered from 1 where there are several."""
+    """`what` as the name of each of `count` directions, numbered from 1 where there are several."""
     return (what,) if count == 1 else tuple(f"{what} {i}" for i in range(1, count + 1))
 
 

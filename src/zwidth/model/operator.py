@@ -77,32 +77,33 @@ def attach(plant: Plant, operator: Operator, across: Floats | None = None) -> Pl
         row = np.append(motion, np.zeros(held.size - plant.size))
         beside = _held(replace(held, handle=row), operator)
         # what a force sensor at the handle reads is the force along the rendered direction
-        own = [
-            np.append(part, np.zeros((*part.shape[:-1], beside.size - held.size)), axis=-1) for part in _hand(held)
+        handle, hand_force = [
+            np.append(part, np.zeros((*part.shape[:-1], beside.size - held.size)), axis=-1)
+            for part in _handle_and_hand_force(held)
         ]
-        held = replace(beside, handle=own[0], hand_force=own[1])
+        held = replace(beside, handle=handle, hand_force=hand_force)
     return held
 
 
-def _hand(plant: Plant) -> tuple[Floats, Floats]:
-    """Handle and hand force of a plant that is held."""
+def _handle_and_hand_force(plant: Plant) -> tuple[Floats, Floats]:
+    """The plant's `handle` (n,) and `hand_force` (3, n), both of which a plant that is held has."""
     assert plant.handle is not None
     assert plant.hand_force is not None
     return plant.handle, plant.hand_force
 
 
 def _held(plant: Plant, operator: Operator) -> Plant:
-    """The plant with an operator who holds it along one motion, `plant.handle`."""
+    """The plant with an operator who holds it along one motion, `plant.handle`; arguments, errors of `attach`."""
     h = plant.handle
     if h is None:
         raise OperatorError("an operator needs a handle to hold; give the plant's `handle`, or leave him out")
     if operator.grasp_stiffness is None:
-        held = np.outer(h, h)
+        along_handle = np.outer(h, h)
         return replace(
             plant,
-            mass=plant.mass + operator.arm_mass * held,
-            damping=plant.damping + operator.arm_damping * held,
-            stiffness=plant.stiffness + operator.arm_stiffness * held,
+            mass=plant.mass + operator.arm_mass * along_handle,
+            damping=plant.damping + operator.arm_damping * along_handle,
+            stiffness=plant.stiffness + operator.arm_stiffness * along_handle,
             hand_force=_hand_force(plant, -h, (operator.arm_mass, operator.arm_damping, operator.arm_stiffness)),
         )
     if not operator.arm_mass > 0.0:
@@ -123,7 +124,10 @@ def _held(plant: Plant, operator: Operator) -> Plant:
 
 
 def _hand_force(plant: Plant, along: Floats, impedance: tuple[Number, Number, Number]) -> Floats:
-    """Rows (..., 3, n) of `Plant.hand_force`: of a mass, a damper and a spring that push along a motion (n,)."""
+    """`Plant.hand_force` (..., 3, n), with the forces of another mass, damper and spring along a motion (..., n).
+
+    impedance  that mass [kg], damper [N s/m] and spring [N/m]
+    """
     rows = stack_numbers(impedance)[..., None] * along[..., None, :]
     if plant.hand_force is None:
         return np.asarray(rows)

@@ -58,9 +58,9 @@ class Friction:
         C = self.coulomb
         if self.model == "dahl":
             return C, C, 1.0, self.bristle_stiffness, 0.0
-        most = self.breakaway if isfinite(self.breakaway) else C
-        slow = self.stribeck_velocity if isfinite(self.stribeck_velocity) else 1.0
-        return C, most, slow, self.bristle_stiffness, self.bristle_damping
+        breakaway = self.breakaway if isfinite(self.breakaway) else C
+        stribeck_velocity = self.stribeck_velocity if isfinite(self.stribeck_velocity) else 1.0
+        return C, breakaway, stribeck_velocity, self.bristle_stiffness, self.bristle_damping
 
 
 @dataclass(frozen=True)
@@ -135,6 +135,7 @@ class Nonlinear:
     fed_friction: bool = False
 
     def __bool__(self) -> bool:
+        """Whether there is any nonlinear part."""
         elements = self.friction or self.counters or self.springs or self.brakes
         return bool(elements or isfinite(self.force_limit) or self.fed_friction)
 
@@ -149,7 +150,7 @@ class Nonlinear:
         )
 
     def padded(self, count: int) -> Nonlinear:
-        """The parts for a plant with more coordinates, added at the end."""
+        """The parts for a plant with `count` more coordinates at its end, on which they do not act."""
         return replace(
             self,
             friction=_padded(self.friction, count),
@@ -174,11 +175,13 @@ class Nonlinear:
 
 
 def _projected(parts: tuple[NonlinearElement, ...], motions: Floats) -> tuple[NonlinearElement, ...]:
+    """Elements as they act on motions (n, m), without those that act on none of them."""
     carried = [replace(part, along=project_onto_motions(part.along, motions)) for part in parts]
     return tuple(part for part in carried if np.any(part.along))
 
 
 def _padded(parts: tuple[NonlinearElement, ...], count: int) -> tuple[NonlinearElement, ...]:
+    """Elements for a plant with `count` more coordinates, on which they do not act."""
     return tuple(replace(part, along=np.append(part.along, np.zeros(count))) for part in parts)
 
 
@@ -285,10 +288,10 @@ class Plant:
             raise ValueError(f"mass must be an array (n, n), got {number}{hint}")
         n = self.mass.shape[-1]
         for name, shape in (("damping", (n, n)), ("stiffness", (n, n)), ("actuator", (n,)), ("sensor", (n,))):
-            own = getattr(self, name).shape
-            if own[len(own) - len(shape) :] != shape:
+            given = getattr(self, name).shape
+            if given[len(given) - len(shape) :] != shape:
                 raise ValueError(
-                    f"{name} must be an array {shape} where mass is {(n, n)}, got one of the shape {own}"
+                    f"{name} must be an array {shape} where mass is {(n, n)}, got one of the shape {given}"
                 )
 
     @property

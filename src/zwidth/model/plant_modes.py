@@ -34,8 +34,8 @@ def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
 
     designs  shape of the designs, where their plants are all the same
     Returns  with `drag`, and as coupled also two modes of one frequency or two free motions with damping; nan as
-             input where a plant is to be looked at alone: dampers that lag, a loss factor, masses that are not
-             positive
+             input where a plant has to be computed by itself, otherwise: dampers that lag, a loss factor, masses
+             that are not positive
     """
     shape = np.broadcast_shapes(design_shape(plant), designs)
     N, n = int(np.prod(shape)), plant.size
@@ -59,7 +59,8 @@ def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
 
 
 def _flat(array: Floats, shape: tuple[int, ...], own: int) -> Floats:
-    """An array (shape, own axes) as (N, own axes), writable: kernels are compiled once for such."""
+    """An array (shape, own axes), of so many own ones, as (N, own axes), writable: kernels are compiled once for
+    such."""
     tail = array.shape[array.ndim - own :]
     return np.array(np.broadcast_to(array, (*shape, *tail)).reshape(-1, *tail), dtype=np.float64, order="C")
 
@@ -82,11 +83,14 @@ def fill_modes(
     first: int,
     last: int,
 ) -> None:
-    """Modes of plants first to last - 1, as in `plant_modes`."""
+    """Fill the fields of `RenderedModes` of plants first to last - 1, given by their matrices (N, n, n) and
+    vectors (N, n): decay, squared, enter, leave (its output), held (its handle), drag and coupled, as
+    `plant_modes` says.
+    """
     n = mass.shape[1]
     root, A, V, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     for i in range(first, last):
-        positive, together = cholesky(mass[i], root), False
+        positive, repeated = cholesky(mass[i], root), False
         relative(root, stiffness[i], A)
         jacobi(A, V)
         # mass-normalised shapes: the columns of root^-T V
@@ -99,19 +103,20 @@ def fill_modes(
         scale = 0.0
         for k in range(n):
             scale = max(scale, abs(A[k, k]))
-        largest, off, free = 0.0, 0.0, 0
+        largest, largest_coupling, free = 0.0, 0.0, 0
+        # squared frequencies, and the dampers V^T B V between modes
         for k in range(n):
             value = A[k, k]
             squared[i, k] = 0.0 if abs(value) <= RIGID * max(scale, 2.3e-308) else value
             for j in range(k):
-                together = together or abs(A[k, k] - A[j, j]) <= REPEATED * scale
+                repeated = repeated or abs(A[k, k] - A[j, j]) <= REPEATED * scale
             for j in range(k + 1):
                 value = 0.0
                 for r in range(n):
                     for s in range(n):
                         value += shapes[r, k] * damping[i, r, s] * shapes[s, j]
                 drag[i, k, j] = drag[i, j, k] = value
-                off = off if j == k else max(off, abs(value))
+                largest_coupling = largest_coupling if j == k else max(largest_coupling, abs(value))
                 largest = max(largest, abs(value))
         for k in range(n):
             for j in range(n):
@@ -123,7 +128,7 @@ def fill_modes(
                 enter[i, k] += shapes[r, k] * actuator[i, r]
                 leave[i, k] += shapes[r, k] * sensor[i, r]
                 held[i, k] += shapes[r, k] * handle[i, r]
-        coupled[i] = together or free > 1 or off > REPEATED * largest
+        coupled[i] = repeated or free > 1 or largest_coupling > REPEATED * largest
         if not positive:
             for k in range(n):
                 enter[i, k] = np.nan
@@ -131,7 +136,7 @@ def fill_modes(
 
 @compiled
 def cholesky(A: Floats, root: Floats) -> bool:
-    """The lower triangle L of A = L L^T (n, n); whether A is positive definite."""
+    """Fill root (n, n) with the lower triangle L of A = L L^T (n, n); False where A is not positive definite."""
     n = A.shape[0]
     for j in range(n):
         for r in range(j, n):
@@ -149,7 +154,7 @@ def cholesky(A: Floats, root: Floats) -> bool:
 
 @compiled
 def relative(root: Floats, A: Floats, out: Floats) -> None:
-    """root^-1 A root^-T of a symmetric A (n, n), root a lower triangle."""
+    """root^-1 A root^-T of a symmetric A (n, n) into out (n, n); root is a lower triangle."""
     n = A.shape[0]
     for c in range(n):
         for r in range(n):
@@ -192,7 +197,8 @@ class Postures:
 
 
 def has_general_modes(mechanism: Mechanism) -> bool:
-    """Whether `modes_in_general` applies: the same drives are flexible in all designs, and no winding brakes."""
+    """Whether `modes_in_general` applies: the same drives are flexible in all designs, and no winding is
+    closed."""
     drives = mechanism.drives
     flexible = np.isfinite(per_design(mechanism, drives.stiffness, 1))
     braked = drives.winding_damping is not None and bool(np.any(drives.winding_damping))
@@ -208,21 +214,24 @@ def modes_in_general(
     direction  (..., 3) or (..., 6), as for `rendered_modes.rendered_modes`
     """
     side, mechanism = drive_side(mechanism, posture), at_postures(mechanism, posture)
-    at = _flat_postures(mechanism, posture, side, screw(direction))
-    M, K, D = _matrices(at)
-    B, ratio = _damping(mechanism, at, damping, M, K, D)
+    flat = _flat_postures(mechanism, posture, side, screw(direction))
+    M, K, D = _matrices(flat)
+    B, ratio = _damping(mechanism, flat, damping, M, K, D)
     N, n = M.shape[:2]
-    c, F = at.h.shape[1], np.flatnonzero(at.flexible)
-    links = np.zeros((N, len(at.flexible), n))
-    links[:, :, :c] = at.side.motion
+    c, F = flat.h.shape[1], np.flatnonzero(flat.flexible)
+    links = np.zeros((N, len(flat.flexible), n))
+    links[:, :, :c] = flat.side.motion
     motors = links.copy()
     motors[:, F] = np.eye(n)[c:]
-    t = at.side.shares(at.h)[:, None]
-    actuator, reading = (t @ motors)[:, 0], (t @ (motors if encoders == "motor" else links))[:, 0]
-    handle = np.concatenate([at.h, np.zeros((N, len(F)))], axis=1)
+    torque_shares = flat.side.shares(flat.h)[:, None]
+    actuator, reading = (
+        (torque_shares @ motors)[:, 0],
+        (torque_shares @ (motors if encoders == "motor" else links))[:, 0],
+    )
+    handle = np.concatenate([flat.h, np.zeros((N, len(F)))], axis=1)
     modes = plant_modes(Plant(M, B, K, actuator, reading, handle), (N,))
-    moved = np.abs(at.h[:, : at.side.driven]).max(axis=1) > 0.0
-    modes.input[np.logical_not(at.known & moved)] = np.nan
+    moved = np.abs(flat.h[:, : flat.side.driven]).max(axis=1) > 0.0
+    modes.input[np.logical_not(flat.known & moved)] = np.nan
     return _with_ratio(modes, ratio)
 
 
@@ -267,7 +276,7 @@ def _flat_postures(mechanism: Mechanism, posture: Posture, side: DriveSide, u: F
 def _matrices(at: Postures) -> tuple[Floats, Floats, Floats]:
     """Mass M and stiffness K (N, n, n) of the full model, and deflections D (N, f, n) of the flexible drives."""
     T, (N, c) = at.side.motion, at.h.shape
-    F, R = np.flatnonzero(at.flexible), np.flatnonzero(~at.flexible)
+    F, R = np.flatnonzero(at.flexible), np.flatnonzero(~at.flexible)  # flexible drives, and rigid ones
     f, n = len(F), c + len(F)
     M = np.zeros((N, n, n))
     M[:, :c, :c] = at.mass + _transposed(T[:, R]) @ (at.rotor[:, R, None] * T[:, R])
@@ -287,7 +296,8 @@ def _matrices(at: Postures) -> tuple[Floats, Floats, Floats]:
 def _damping(
     mechanism: Mechanism, at: Postures, damping: Damping, M: Floats, K: Floats, D: Floats
 ) -> tuple[Floats, Floats | None]:
-    """Damping B (N, n, n) of the full model, and the damping ratio (N,) that comes to every flexible mode."""
+    """Damping B (N, n, n) of the full model; and the damping ratio (N,) that every flexible mode has besides, None
+    for none. M, K and D are those of `_matrices`."""
     B, ratio, c = np.zeros_like(K), None, at.h.shape[1]
 
     def of_each(number: float | Floats) -> Floats:
@@ -306,7 +316,7 @@ def _damping(
 
 
 def _with_ratio(modes: RenderedModes, ratio: Floats | None) -> RenderedModes:
-    """The modes with a damping ratio (N,) more of each flexible one."""
+    """The modes with a damping ratio (N,) added to each flexible one of a plant; None: with none added."""
     if ratio is None:
         return modes
     assert modes.drag is not None
@@ -316,4 +326,5 @@ def _with_ratio(modes: RenderedModes, ratio: Floats | None) -> RenderedModes:
 
 
 def _transposed(matrices: Floats) -> Floats:
+    """Matrices (..., n, m) as (..., m, n)."""
     return np.swapaxes(matrices, -1, -2)

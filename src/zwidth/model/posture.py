@@ -1,6 +1,6 @@
 """The posture of a mechanism from the position of its handle.
 
-Why a mechanism has no posture, in words: what, where, and what to ask for instead.
+Why a mechanism has none, in words. Shapes have the letters of `MechanismArrays`; goals have g numbers (`_goals`).
 """
 
 from __future__ import annotations
@@ -116,11 +116,11 @@ class Posture:
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Posture:
         """The same postures with these leading axes; itself where it has them. Raises ValueError as numpy does."""
-        own = self.status.ndim
+        count = self.status.ndim
         if shape == self.status.shape:
             return self
         # copies: what cannot be written to is another type for the kernels, compiled anew
-        return self.with_axes(lambda array: np.array(np.broadcast_to(array, shape + array.shape[own:])))
+        return self.with_axes(lambda array: np.array(np.broadcast_to(array, shape + array.shape[count:])))
 
 
 def _arrays(posture: Posture) -> dict[str, NDArray[Any]]:
@@ -196,9 +196,9 @@ def solve_posture(
         missed = np.flatnonzero(~closed[design] | (solved.status != OK))
         solved.overwrite(missed, failed_batch(mech, len(missed), UNSOLVED))
         far = missed[closed[design[missed]] & far_outside_shells(mech, design[missed], goals[missed], tolerance)]
-        own, place = np.unique(design[far], return_inverse=True)
-        solved.status[far[drives_fit(mechanism, mech, own, reference[own])[place]]] = OUT_OF_REACH
-        return _posture(name, mech, goals, solved, np.where(solved.status == OK, 0.0, np.nan), shape)
+        tried, of_tried = np.unique(design[far], return_inverse=True)
+        solved.status[far[drives_fit(mechanism, mech, tried, reference[tried])[of_tried]]] = OUT_OF_REACH
+        return _posture_of_batch(name, mech, goals, solved, np.where(solved.status == OK, 0.0, np.nan), shape)
     first = int(np.argmax(closed))
     uncontrolled = check_mobility(mechanism, mech, first, reference[first]) if closed.any() else None
     if uncontrolled and not shape:
@@ -207,7 +207,7 @@ def solve_posture(
     solved = failed_batch(mech, len(goals)) if singular else solve_batch(mech, design, reference, goals)
     widest = tolerance if tolerance > 0.0 or not shape else None
     projected, near = _project_goals(mech, design, reference, goals, solved, widest)
-    posture = _posture(name, mech, goals, solved, projected, shape)
+    posture = _posture_of_batch(name, mech, goals, solved, projected, shape)
     if not shape and posture.status != OK:
         raise posture_failure(mechanism, mech, int(posture.status), name, reference[0], goals[0], near)
     return posture
@@ -216,7 +216,7 @@ def solve_posture(
 def _goals_of_designs(
     mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayLike | None
 ) -> tuple[Floats, tuple[int, ...]]:
-    """Return goals (N, g) [m], [rad] of N postures, and the shape of their batch; raises as `_goals`."""
+    """Goals (N, g) [m], [rad] of N postures, and the shape of their batch; raises as `_goals`."""
     target = _goals(mechanism, position, orientation)
     shape = np.broadcast_shapes(mechanism.design_shape, target.shape[:-1])
     # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
@@ -253,7 +253,7 @@ def _project_goals(
     return projected, near
 
 
-def _posture(
+def _posture_of_batch(
     name: str,
     mech: MechanismArrays,
     goals: Floats,
@@ -299,13 +299,13 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
               ValueError  for an unknown assembly, or a batch of designs
     """
     name = _assembly_name(mechanism, assembly)
-    mech, reference = _single(mechanism, name, "reachable positions are computed for one design at a time")
+    mech, reference = _one_design(mechanism, name, "reachable positions are computed for one design at a time")
     if mech.controls == POSE:
         return positions_about_reference(mech, reference)
     return roadmap(mech, 0, reference).position
 
 
-def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismArrays, Floats]:
+def _one_design(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismArrays, Floats]:
     """One design packed, and its reference posture (n,) in an assembly; `otherwise` is said of several designs."""
     if mechanism.design_shape:
         raise ValueError(otherwise)
@@ -318,7 +318,7 @@ def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismA
     return mech, reference[0]
 
 
-def _has_limits(mech: MechanismArrays) -> bool:
+def _has_joint_limits(mech: MechanismArrays) -> bool:
     return bool(np.isfinite(mech.lower).any() or np.isfinite(mech.upper).any())
 
 
@@ -341,7 +341,7 @@ def place_of_joints(
         raise ValueError(
             f"give the angle of every driven joint, {', '.join(driven)}; got {', '.join(coordinates)}"
         )
-    mech, reference = _single(mechanism, name, "postures are given by their joints for one design at a time")
+    mech, reference = _one_design(mechanism, name, "postures are given by their joints for one design at a time")
     goal = goal_of_angles(mech, reference, np.array([coordinates[joint] for joint in driven]))
     if goal is None:
         units = ["m" if mech.kind[joint] == PRISMATIC else "rad" for joint in mechanism.drives.joint]
@@ -350,7 +350,7 @@ def place_of_joints(
         )
         raise OutOfReach(
             f"the joints cannot be turned to {requested} in assembly {name!r} without passing a singularity"
-            f"{' or a limit' if _has_limits(mech) else ''}; ask for angles nearer to those of the reference"
+            f"{' or a limit' if _has_joint_limits(mech) else ''}; ask for angles nearer to those of the reference"
         )
     if mechanism.controls == POSITION:
         return goal, None
@@ -386,8 +386,7 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, rates: ArrayLike) -> F
 
         M p'' + c(p, p') = Q,    c = B^T (c_q + M_q B' p')             (thesis eq. B.19)
 
-    rates     (..., c)  p' [rad/s], broadcasting with the posture: those of the driven joints, then of the free
-              ones
+    rates     (..., c)  p' [rad/s] of the driven joints, then of the free ones, broadcasting with the posture
     Returns   (..., c); nan where the posture is not OK
     """
     mech, designs = pack(mechanism), mechanism.design_shape
@@ -415,9 +414,9 @@ def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
     return LinkPoints(origin.reshape(*shape, n, 3), tip.reshape(*shape, n, 3), rotation.reshape(*shape, n, 3, 3))
 
 
-# Fills in axes (N, n, 3, 3) and origins (N, n, 3) [m] of the links at joint coordinates (N, n).
 @compiled
 def _place_batch(mech: MechanismArrays, design: Ints, angles: Floats, rotation: Floats, origin: Floats) -> None:
+    """Fill axes (N, n, 3, 3) and origins (N, n, 3) [m] of the links at joint coordinates (N, n)."""
     work = working_memory(mech)
     for i in range(design.size):
         place_links(mech, design[i], angles[i], work)
@@ -435,7 +434,7 @@ def _references(mechanism: Mechanism, mech: MechanismArrays, name: str) -> tuple
 
 
 def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
-    """Name of an assembly, None being the first one. Raises ValueError for an unknown name."""
+    """The name of an assembly; None stands for the first one. Raises ValueError for an unknown name."""
     names = list(mechanism.assemblies)
     name = names[0] if assembly is None else assembly
     if name not in mechanism.assemblies:
@@ -444,7 +443,7 @@ def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
 
 
 def _goals(mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayLike | None) -> Floats:
-    """Goals (..., g) of the handle: its position, the vector of its orientation, or one after the other."""
+    """Goals (..., g) of the handle: position [m], vector of the orientation [rad], or both in this order."""
     if mechanism.controls == POSITION:
         if orientation is not None:
             raise ValueError("the drives do not control the orientation of the handle; leave orientation out")
@@ -520,7 +519,7 @@ def posture_failure(
         instead = f"an answered {what} is {describe_goal(mech, near)}, {_distance(mech, near, goal)} away"
     if status == BEYOND_LIMIT:
         return BeyondLimit(
-            f"with its handle at {where} in assembly {assembly!r} {_limit(mechanism, mech, reference, goal)}"
+            f"with its handle at {where} in assembly {assembly!r} {_limit_text(mechanism, mech, reference, goal)}"
         )
     nearest = near if mech.controls == POSITION else None
     if status == OUT_OF_REACH and mech.controls == POSITION and np.array_equal(goal, mechanism.reference_position):
@@ -542,14 +541,15 @@ def posture_failure(
 
 def describe_goal(mech: MechanismArrays, goal: Floats) -> str:
     """A goal (g,) in words: the position in metres, the orientation as roll, pitch and yaw in radians."""
-    position = _numbers(goal[:3]) + " m"
+    position = _vector_text(goal[:3]) + " m"
     if mech.controls == POSITION:
         return position
-    turned = f"roll, pitch, yaw {_numbers(roll_pitch_yaw_of(rotation_matrix(goal[-3:])))} rad"
+    turned = f"roll, pitch, yaw {_vector_text(roll_pitch_yaw_of(rotation_matrix(goal[-3:])))} rad"
     return turned if mech.controls == ORIENTATION else f"{position} with {turned}"
 
 
-def _numbers(values: Floats) -> str:
+def _vector_text(values: Floats) -> str:
+    """A vector in words, "(0, -5, 0)"."""
     return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"
 
 
@@ -562,7 +562,7 @@ def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:
     return " and ".join(parts)
 
 
-def _limit(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal: Floats) -> str:
+def _limit_text(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal: Floats) -> str:
     """Message: which joint is beyond which limit at a goal (g,), straight from the reference (n,)."""
     angles = reference.copy()
     link = _joint_beyond(mech, angles, goal[None].copy())
@@ -594,7 +594,7 @@ def _drive_with_table(mechanism: Mechanism, link: int) -> tuple[str, RatioTable]
 
 @compiled
 def _joint_beyond(mech: MechanismArrays, angles: Floats, goals: Floats) -> int:
-    """Link whose joint is beyond its limit at the goal, reached straight from `angles` (in place); or -1."""
+    """Link whose joint is beyond its limit at goal (1, g), straight from `angles` (n,) (in place); -1: none."""
     work = working_memory(mech)
     follow(mech, 0, goals, 0, angles, work)
     return joint_beyond_limit(mech, 0, angles)

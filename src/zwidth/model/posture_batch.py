@@ -6,6 +6,9 @@ Every way from the base to the handle through links and closures is a chain of s
 lengths l_1 ... l_n reaches from max(0, 2 max l - sum l) to sum l of where it begins, and no farther. A goal
 outside any chain's shell is out of reach, which is found at once; inside all of them it may still be out of reach.
 A chain with a prismatic joint, whose segment changes its length, has no shell; nor has an orientation.
+
+Shapes have the letters of `MechanismArrays`, and goals g numbers: the handle's position [m], the vector of its
+orientation [rad], or one after the other.
 """
 
 from __future__ import annotations
@@ -44,7 +47,10 @@ ROADMAP_LEAST: Final = 16384
 
 @dataclass(frozen=True)
 class PostureBatch:
-    """Flat results of a batch of N postures."""
+    """Results of a batch of N postures: fields of `posture.Posture` of these names, with one axis (N, ...).
+
+    mass is its mass_matrix, residual its closure_residual
+    """
 
     status: NDArray[np.uint8]
     angles: Floats
@@ -55,7 +61,7 @@ class PostureBatch:
     residual: Floats
 
     def overwrite(self, where: Flags | Ints, other: PostureBatch) -> None:
-        """Write another batch's results over some of this one's."""
+        """Write the results of another batch, of as many postures as `where` picks of this one, over those."""
         for mine, new in zip(vars(self).values(), vars(other).values(), strict=True):
             mine[where] = new
 
@@ -164,7 +170,11 @@ def _postures(
     first: int,
     last: int,
 ) -> None:
-    """Postures first to last - 1 of a batch, one after the other in one working memory."""
+    """Fill the fields of `PostureBatch` of goals (N, g) first to last - 1, one after the other in one working
+    memory.
+
+    starts (S, n), which (N,)  joint coordinates, and the index of those that each goal is followed from
+    """
     work = working_memory(mech)
     present, gaps, kind = work.angles, work.gaps, mech.kind
     n, loops = present.size, mech.first_row[mech.a.size]
@@ -225,7 +235,8 @@ def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> Flags:
 
 
 def far_outside_shells(mech: MechanismArrays, designs: Ints, goals: Floats, tolerance: float) -> Flags:
-    """Which of N designs have their goal (N, g) outside of a chain's shell by more than they project it, (N,).
+    """Which of N designs (indices, (N,)) have their goal (N, g) outside of a chain's shell by more than it may be
+    projected, (N,).
 
     tolerance  how far a position is projected, as a share of the arm's length
     """
@@ -238,8 +249,8 @@ def far_outside_shells(mech: MechanismArrays, designs: Ints, goals: Floats, tole
 
 
 def arm_length(mech: MechanismArrays, found: Sequence[Shell], design: int | Ints) -> Floats:
-    """From the base to the handle through the shortest of all chains, stretched out [m]; where no chain has a
-    length, the mechanism's size."""
+    """Length from the base to the handle through the shortest of all chains, stretched out [m]: () or (N,), as of
+    `shells`, which found them; where no chain has a length, the mechanism's size."""
     if not found:
         return np.asarray(mech.size[design])
     return np.asarray(np.min([shell.most for shell in found], axis=0))
@@ -261,7 +272,8 @@ def shells(mech: MechanismArrays, design: int | Ints) -> list[Shell]:
 
 
 def _shared_points(mech: MechanismArrays, design: int | Ints) -> list[SharedPoint]:
-    """Points that two links share: at joints that do not slide, and at closures."""
+    """Points that two links share, in the frame of each: at joints that do not slide, and at closures; design as
+    of `shells`."""
     tip = np.zeros_like(mech.handle[design, 0])
     joints = [
         (int(mech.parent[i]), mech.origin[design, i], i, tip)
@@ -276,22 +288,27 @@ def _shared_points(mech: MechanismArrays, design: int | Ints) -> list[SharedPoin
 
 
 def _chains(
-    meetings: list[SharedPoint],
+    shared: list[SharedPoint],
     last: int,
     handle: Floats,
     link: int = BASE,
     at: Floats | None = None,
     visited: frozenset[int] = frozenset({BASE}),
 ) -> Iterator[tuple[Floats, list[Floats]]]:
-    """Where each chain leaves the base, and the lengths of its segments; `at` is where it entered `link`."""
+    """Each chain from `link` on to the handle (3,), a point of link `last`: where it leaves the base (3,), and the
+    lengths of its segments [m].
+
+    at       point of the link's frame at which the chain entered it; None: it begins there, at the base
+    visited  links of the chain so far, to which it does not return
+    """
     if at is not None and link == last:
         yield at, [_length(handle - at)]
         return
-    both_ways = [*meetings, *((b, q, a, p) for a, p, b, q in meetings)]
+    both_ways = [*shared, *((b, q, a, p) for a, p, b, q in shared)]
     for here, leaves, there, enters in both_ways:
         if here != link or there in visited:
             continue
-        for start, rest in _chains(meetings, last, handle, there, enters, visited | {there}):
+        for start, rest in _chains(shared, last, handle, there, enters, visited | {there}):
             if at is None:
                 yield leaves, rest
             else:
@@ -299,4 +316,5 @@ def _chains(
 
 
 def _length(segment: Floats) -> Floats:
+    """Length (...) of vectors (..., 3)."""
     return np.asarray(np.linalg.norm(segment, axis=-1))

@@ -73,7 +73,8 @@ def sweep_response(
 
 
 def block_length(samples: int, segment: int | None = None) -> int:
-    """Samples of the blocks that a record of so many is cut into: all of them, of a long record about `BLOCK`."""
+    """Number of samples in each of the blocks that a record of so many `samples` is cut into: all, of a long
+    record about `BLOCK`. segment as in `sweep_response`."""
     block = BLOCK if segment is None else max(BLOCK, SEGMENTS_IN_BLOCK * segment)
     return samples if samples < 2 * block else samples // (samples // block)
 
@@ -105,12 +106,13 @@ def sweep_response_of_blocks(
     if whole.low == whole.high:
         raise ResponseError(f"the commanded force is {whole.low:g} N all the time; excite the device")
     step = step if np.isfinite(step) else 0.0
+    # the encoder's rounding, q^2/12 in each reading, in the transform of the position differenced m times
     floor = count * step**2 / 12.0 * np.abs(2.0 * np.sin(np.pi * np.arange(values) / count)) ** (2 * m)
     places = _places(samples, segment) * count
     local = _response_of_blocks(U, Y, sums, places, floor, narrowest)
-    one = np.abs(2.0 * np.sin(np.pi * places / count)) ** m
-    hidden = _hidden_by_steps(whole, step, places / count, local, one, samples)
-    value, coherence = _value_and_coherence(local, hidden, one, places, count, m)
+    gain = np.abs(2.0 * np.sin(np.pi * places / count)) ** m
+    hidden = _hidden_by_steps(whole, step, places / count, local, gain, samples)
+    value, coherence = _value_and_coherence(local, hidden, gain, places, count, m)
     excited = _excited(places, local.excited) & np.isfinite(coherence) & np.isfinite(value)
     return Response(
         frequency=places / count / period,
@@ -175,22 +177,22 @@ def _response_of_blocks(
 
 
 def _value_and_coherence(
-    local: LocalResponse, hidden: Floats, one: Floats, places: Floats, count: int, m: int
+    local: LocalResponse, hidden: Floats, gain: Floats, places: Floats, count: int, m: int
 ) -> tuple[Complexes, Floats]:
     """Return the response (n,) [m/N] and its coherence (n,), not finite where nothing is known.
 
     local  the response of the position differenced m times;   hidden  error of P that no scatter shows (n,) [m/N]
-    one    (n,) |z - 1|^m;   places  (n,) frequencies, in spacings of a transform of `count` samples
+    gain   (n,) |z - 1|^m;   places  (n,) frequencies, in spacings of a transform of `count` samples
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = (local.variance + (hidden * one) ** 2) / np.abs(local.value) ** 2
+        relative = (local.variance + (hidden * gain) ** 2) / np.abs(local.value) ** 2
         coherence = 1.0 / (1.0 + AVERAGES * relative)
         value = local.value / (np.exp(2j * np.pi * places / count) - 1.0) ** m
     return value, coherence
 
 
 def fast_length(samples: int) -> int:
-    """So many samples, or a few fewer whose transform is fast."""
+    """The number of samples, or one a little smaller whose transform is fast."""
     from scipy.fft import prev_fast_len
 
     return int(prev_fast_len(samples))
@@ -218,9 +220,10 @@ class _ForceSize:
 
     @classmethod
     def of(cls, force: Floats) -> _ForceSize:
-        """The size of a block (n,)."""
+        """The size of the force of one block (n,) [N]."""
         pieces = force[: len(force) // PIECE * PIECE].reshape(-1, PIECE)
         pieces = pieces[:: max(1, len(pieces) // MOST_PIECES)]
+        # power of each piece at each frequency, and how many frequencies share it: all alike (sum p)^2 / sum p^2
         power = np.abs(np.fft.rfft(pieces * np.hanning(PIECE), axis=1)) ** 2
         total = np.sum(power, axis=1)
         taking_part = total**2 / np.maximum(np.sum(power**2, axis=1), 1e-300)
@@ -230,7 +233,7 @@ class _ForceSize:
 
     @classmethod
     def together(cls, blocks: Sequence[_ForceSize]) -> _ForceSize:
-        """The size of blocks of one length."""
+        """The size of the force in all of several blocks of one length."""
         means = [one.mean for one in blocks]
         variance = np.mean([one.variance for one in blocks]) + np.var(means)
         power, shared = (sum(getattr(one, name) for one in blocks) for name in ("power", "shared"))
@@ -245,7 +248,7 @@ class _ForceSize:
 
 
 def _hidden_by_steps(
-    force: _ForceSize, step: float, f: Floats, local: LocalResponse, one: Floats, samples: int
+    force: _ForceSize, step: float, f: Floats, local: LocalResponse, gain: Floats, samples: int
 ) -> Floats:
     """Error of P (n,) [m/N], as a deviation, that the encoder's steps make and no scatter shows.
 
@@ -256,31 +259,34 @@ def _hidden_by_steps(
     frequency, does not, nor what the steps themselves may make, q^2 / 4.
 
     step q [m];  f (n,) frequencies in those of sampling;  samples  of a transform
-    local  the response of the differenced position, and one (n,) = |z - 1|^m
+    local  the response of the differenced position, and gain (n,) = |z - 1|^m
     """
     if step == 0.0:
         return np.zeros(len(f))
-    own = (np.abs(local.value) / one) ** 2 * local.excited * force.broad
-    spectrum = 2.0 * (local.noise / one**2 + own) / samples
+    # power of what follows the force, and the spectrum of all motion that may blur the steps
+    following = (np.abs(local.value) / gain) ** 2 * local.excited * force.broad
+    spectrum = 2.0 * (local.noise / gain**2 + following) / samples
     widths = np.gradient(f)
     above = np.cumsum((spectrum * widths)[::-1])[::-1]
     slower = np.searchsorted(f, f / SLOW)
-    other = np.maximum(above[slower] - step**2 / 4.0, 0.0)
+    other_motion = np.maximum(above[slower] - step**2 / 4.0, 0.0)
     amplitude = np.sqrt(2.0 * force.variance)
-    steps = np.abs(local.value) / one * amplitude / step
+    steps = np.abs(local.value) / gain * amplitude / step
     largest = 2.0 / np.pi * np.minimum(1.0, 0.7 / np.sqrt(np.maximum(steps, 1e-9))) * step / amplitude
-    return np.asarray(largest * np.exp(-2.0 * np.pi**2 * other / step**2) / LARGEST_IN_DEVIATIONS)
+    return np.asarray(largest * np.exp(-2.0 * np.pi**2 * other_motion / step**2) / LARGEST_IN_DEVIATIONS)
 
 
 def _excited(places: Floats, power: Floats) -> Flags:
-    """Which places (n,) the force excites: with some power, and not above the frequency where it ends."""
+    """Which places (n,), frequencies, the force excites: with some of its power (n,), and not above where it
+    ends."""
     usual = np.array([np.median(power[(places >= 0.5 * place) & (places <= place)]) for place in places])
     enough = np.flatnonzero(power >= LEFT_AT_END * usual)
     return np.asarray((power > EXCITED * np.max(power)) & (np.arange(len(places)) <= enough[-1]))
 
 
 def _places(samples: int, segment: int | None) -> Floats:
-    """Frequencies of the response, in those of sampling, (n,) up to 1/2: for all records of about one length."""
+    """Frequencies (n,) of the response over that of sampling, up to 1/2: the same for all records of about one
+    length; segment as in `sweep_response`."""
     whole = 2 ** int(np.log2(samples))
     spacing = 1.0 / segment if segment else CLOSEST / whole
     first = np.arange(2.0 if segment else 1.0, 1.0 / RATIO) * spacing

@@ -73,7 +73,7 @@ def reduce_mechanism(
     spring; in the rigid model they are rigid.
 
     posture    a single one, OK
-    direction  (3,)  unit vector in the base frame; or (6,), a screw: see `effective_parameters.screw`
+    direction  (3,)  unit vector in the base frame; or (6,), a screw: see `effective_mass.screw`
     encoders   what they read: the motors, or the links behind the drives
     Returns    Plant; a drive of infinite stiffness has no theta of its own, its rotor moves with its link
     Raises     ModelError  where the model does not apply: no flexible drive in this direction
@@ -95,14 +95,14 @@ def reduce_mechanism(
         return reduce_plant(add_dampers(full, electrical), model)
     numbers = effective_parameters(mechanism, posture, u)
     if model == "rigid":
-        slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
-        reduced = _rigid(float(numbers.rigid_mass), slip * float(numbers.rigid_mass))
+        mass_damping = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
+        reduced = _rigid(float(numbers.rigid_mass), mass_damping * float(numbers.rigid_mass))
     elif not np.isfinite(numbers.stiffness):
         raise ModelError(
             f"model {model!r} needs a flexible drive in this direction and all are rigid; use 'rigid'"
         )
     elif mechanism.flexible:
-        dampers = _own_dampers(mechanism.drives, side, damping)
+        dampers = _given_dampers(mechanism.drives, side, damping)
         reduced = _two_mass_of_links(full, numbers, damping, dampers, link_fixed=model == "motor-mass")
     else:
         reduced = _two_mass(mechanism.drives, numbers, h, damping, link_fixed=model == "motor-mass")
@@ -206,11 +206,12 @@ def plant_effective_parameters(plant: Plant) -> EffectiveParameters:
 
 
 def _mass_at(plant: Plant, v: Floats) -> float:
-    """1 / (v^T M^-1 v) [kg]"""
+    """Effective mass 1 / (v^T M^-1 v) [kg] where v (n,) acts: the plant's handle or actuator."""
     return 1.0 / float(v @ np.linalg.solve(plant.mass, v))
 
 
 def _check_model(model: str) -> None:
+    """Raise ValueError for an unknown name of a model."""
     if model not in MODELS:
         raise ValueError(f"there is no model {model!r}; choose one of {', '.join(MODELS)}")
 
@@ -231,15 +232,18 @@ def _full(
 ) -> tuple[Plant, list[LaggedDamper]]:
     """M = [M_phi, C; C^T, M_theta], K = D^T k D on the coordinates of the links and the motors of the flexible
     drives, D their deflections T phi - theta and C = J_m n S^T; and the electrical dampers beside the structural
-    ones."""
+    ones.
+
+    link_mass (c, c), h (c,)  mass matrix of the links, lever arms, in the independent coordinates
+    """
     drives = mechanism.drives
     M, K, D, flexible = full_matrices(drives, side, link_mass)
     n, c = len(M), len(h)
-    t, (d, f) = side.shares(h), (len(drives.names), len(flexible))
+    torque_shares, (d, f) = side.shares(h), (len(drives.names), len(flexible))
     links = np.concatenate([side.motion, np.zeros((d, f))], axis=1)
     motors = links.copy()
     motors[flexible] = np.eye(n)[c:]
-    actuator, handle = t @ motors, np.concatenate([h, np.zeros(f)])
+    actuator, handle = torque_shares @ motors, np.concatenate([h, np.zeros(f)])
     encoded = motors if encoders == "motor" else links
     B = _full_damping(M, K, D, _at_joint(drives)[2][flexible], damping)
     if side.damping is not None:
@@ -248,19 +252,20 @@ def _full(
     names += [f"{mechanism.links.names[i]} joint" for i in mechanism.free]
     names += [f"bending {i + 1}" for i in range(c - len(names))]
     names += [f"{drives.names[i]} motor" for i in flexible]
-    parts = nonlinear_of_drives(drives, t, links, motors, encoded)
+    parts = nonlinear_of_drives(drives, torque_shares, links, motors, encoded)
     rubbing = tuple(
         Friction(np.concatenate([along, np.zeros(f)]), float(level))
         for along, level in zip(side.rubbing, side.coulomb, strict=True)
     )
     parts = replace(parts, friction=parts.friction + rubbing)
-    plant = Plant(M, B, K, actuator, t @ encoded, handle, tuple(names), nonlinear=parts)
+    plant = Plant(M, B, K, actuator, torque_shares @ encoded, handle, tuple(names), nonlinear=parts)
     return plant, winding_dampers(drives, motors)
 
 
 def full_matrices(drives: Drives, side: DriveSide, link_mass: Floats) -> tuple[Floats, Floats, Floats, Ints]:
-    """M and K (n, n) of one posture's full model, the deflections D (f, n) of its flexible drives, and which these
-    are (f,)."""
+    """M and K (n, n) of one posture's full model, the deflections D (f, n) of its flexible drives per coordinate,
+    and the indices (f,) of these drives; link_mass (c, c) in the independent coordinates, those first among the
+    n."""
     rotor, spring, _ = _at_joint(drives)
     flexible = np.flatnonzero(np.isfinite(spring))
     rigid = np.flatnonzero(~np.isfinite(spring))
@@ -282,7 +287,7 @@ def full_matrices(drives: Drives, side: DriveSide, link_mass: Floats) -> tuple[F
 
 
 def _padded(matrix: Floats, more: int) -> Floats:
-    """The matrix with so many more rows and columns of zeros."""
+    """The matrix with `more` rows and columns of zeros added at its end."""
     return np.pad(matrix, ((0, more), (0, more)))
 
 
@@ -305,25 +310,27 @@ def _two_mass(
     given         b = x^T B x, the dampers moved as the drives deflect under one metre: x_i = k h_i / k_i
     """
     m1, m2, k = float(numbers.link_side_mass), float(numbers.motor_side_mass), float(numbers.stiffness)
-    b, slip = _damping_between(m1, m2, k, damping), 0.0
+    b, mass_damping = _damping_between(m1, m2, k, damping), 0.0
     if isinstance(damping, ProportionalDamping):
-        slip = damping.mass_coefficient_1_per_s
+        mass_damping = damping.mass_coefficient_1_per_s
     elif not isinstance(damping, ModalDamping):
         _, spring, damper = _at_joint(drives)
         b = float(np.sum(damper * (k * h / spring) ** 2))
     plant = _motor_mass(m2, b, k) if link_fixed else _pair(m1, m2, b, k)
-    return replace(plant, damping=plant.damping + slip * plant.mass)
+    return replace(plant, damping=plant.damping + mass_damping * plant.mass)
 
 
-def _own_dampers(drives: Drives, side: DriveSide, damping: Damping) -> Floats:
+def _given_dampers(drives: Drives, side: DriveSide, damping: Damping) -> Floats:
     """Dampers (n, n) of the full model that are given one by one: of joints, of links that bend, and of the drives
     where these are the device's damping."""
     _, spring, damper = _at_joint(drives)
     flexible = np.isfinite(spring)
     f = int(np.count_nonzero(flexible))
     D = np.concatenate([side.motion[flexible], -np.eye(f)], axis=1)
-    own = D.T @ (damper[flexible, None] * D) if isinstance(damping, GivenDamping) else np.zeros((D.shape[1],) * 2)
-    return own if side.damping is None else own + _padded(side.damping, f)
+    dampers = (
+        D.T @ (damper[flexible, None] * D) if isinstance(damping, GivenDamping) else np.zeros((D.shape[1],) * 2)
+    )
+    return dampers if side.damping is None else dampers + _padded(side.damping, f)
 
 
 def _two_mass_of_links(
@@ -336,8 +343,8 @@ def _two_mass_of_links(
     if isinstance(damping, ProportionalDamping):
         pair = replace(pair, damping=pair.damping + damping.mass_coefficient_1_per_s * pair.mass)
     W = _motions(full, "two-mass")
-    own = W.T @ dampers @ W
-    pair = replace(pair, damping=pair.damping + (own + own.T) / 2.0)
+    of_sides = W.T @ dampers @ W
+    pair = replace(pair, damping=pair.damping + (of_sides + of_sides.T) / 2.0)
     return _motor_mass(m2, float(pair.damping[1, 1]), k) if link_fixed else pair
 
 
@@ -397,7 +404,11 @@ def _is_two_mass(plant: Plant) -> bool:
 
 
 def _rigid_motion(plant: Plant) -> tuple[float, Floats]:
-    """Mass 1/(a^T Z (Z^T M Z)^-1 Z^T a), and the motion x that a force at the actuator makes, a . x = 1."""
+    """Rigid mass 1/(a^T Z (Z^T M Z)^-1 Z^T a), with a the actuator and Z the rigid modes, and the rigid motion x
+    (n,) that a force at the actuator makes, of one metre there: a . x = 1.
+
+    Raises  ModelError  where the actuator moves no rigid mode
+    """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     Z = shapes[:, squared == 0.0]
     participation = Z.T @ plant.actuator
@@ -411,15 +422,16 @@ def _rigid_motion(plant: Plant) -> tuple[float, Floats]:
 
 
 def _drag(plant: Plant, motion: Floats) -> float:
-    """x^T B x of a rigid motion x; dampers inside the plant leave rounding on it, no drag."""
+    """Damper x^T B x [N s/m] to the ground of a rigid motion x (n,); 0 where dampers inside the plant leave only
+    rounding."""
     drag = float(motion @ plant.damping @ motion)
     inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
     return drag if drag > 1e-12 * inside else 0.0
 
 
 def _sides(plant: Plant, deflection: Floats) -> Floats | None:
-    """Motions (n, 2) of the link side alone and of the motor side alone; None where a spring ties both to the
-    ground, so that only their difference is a motion.
+    """Motions W (n, 2) of the link side alone and of the motor side alone, from the deflection x (n,); None where
+    a spring ties both to the ground, so that only their difference is a motion.
 
     With r the rigid motion of one metre, W = [r - w, w] with w = x + (1 - a . x) r, which moves the actuator by
     one metre and the handle by none.
@@ -433,7 +445,8 @@ def _sides(plant: Plant, deflection: Floats) -> Floats | None:
 
 
 def _side_damping(plant: Plant, deflection: Floats) -> Floats:
-    """Damping of the two sides, (2, 2) on [link side, motor side]: W^T B W, or x^T B x between them."""
+    """Damping (2, 2) on [link side, motor side]: W^T B W (see `_sides`); without drag x^T B x between them, of the
+    deflection x (n,)."""
     sides = _sides(plant, deflection)
     if sides is None or not _drag(plant, sides.sum(axis=1)):
         return float(deflection @ plant.damping @ deflection) * np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -442,7 +455,7 @@ def _side_damping(plant: Plant, deflection: Floats) -> Floats:
 
 
 def _motions(plant: Plant, model: Model) -> Floats:
-    """The motions (n, m) of a plant that a reduced model's coordinates stand for."""
+    """The motions (n, m) of a plant, in columns, that the m coordinates of its reduced model stand for."""
     if model == "rigid":
         return _rigid_motion(plant)[1][:, None]
     _, deflection = _spring(plant)
@@ -479,7 +492,7 @@ def _reduced_nonlinear(reduced: Plant, plant: Plant, motions: Floats) -> Nonline
 
 
 def _with_handle(reduced: Plant, plant: Plant, motion: Floats) -> Plant:
-    """The rigid model held where the plant is: at what its rigid motion moves the handle by."""
+    """The rigid model `reduced` of a plant with the plant's handle: as far as its rigid motion (n,) moves that."""
     if plant.handle is None:
         return reduced
     share = float(plant.handle @ motion)
@@ -494,6 +507,7 @@ def _with_sensor(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
     sensor = project_onto_motions(plant.sensor, motions)
     if reduced.size > 1 and plant.handle is not None and np.array_equal(plant.sensor, plant.handle):
         sensor = reduced.handle if reduced.handle is not None else sensor
+    # the last motion is that of the motor side, or of the whole: one metre at the actuator unless springs hold it
     elif not abs(plant.actuator @ motions[:, -1] - 1.0) <= READING_TOLERANCE:
         raise ModelError(
             "the plant is tied to the ground, and what the sensor reads of two masses is not known; use 'full'"
@@ -504,7 +518,8 @@ def _with_sensor(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
 
 
 def _spring(plant: Plant) -> tuple[float, Floats]:
-    """Stiffness between actuator and handle, and the static deflection x that one metre between them makes.
+    """Stiffness k [N/m] between actuator a and handle h, and the static deflection x (n,) of one metre between
+    them.
 
     x = k K^+ (a - h), by the flexible modes; it exists only where a - h does no work on a rigid motion.
     """

@@ -75,7 +75,7 @@ def rendered_modes(
     (`effective_mass.is_plain`); None for readings behind the drives in a reduced model.
 
     posture    (...), flattened to N; the designs of the mechanism broadcast with it
-    direction  (..., 3)  unit vectors, or (..., 6) screws (`effective_parameters.screw`)
+    direction  (..., 3)  unit vectors, or (..., 6) screws (`effective_mass.screw`)
     Returns    nan as input where there are no such modes: given dampers that couple them, windings closed through
                resistors, rigid drives in a model that needs flexible ones
     """
@@ -89,13 +89,14 @@ def rendered_modes(
     spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
     # B = r_m M + r_k K and a ratio on every flexible mode: a = (r_m + r_k w^2)/2 + ratio w
     coefficients = _coefficients(mechanism, damping)
+    # row of the coefficients of each posture: that of its design, or its own
     each = design if len(coefficients) == int(np.prod(mechanism.design_shape)) else np.arange(len(coefficients))
     if drives.winding_damping is not None:
         braked = per_design(mechanism, drives.winding_damping, 1).any(axis=1)
         coefficients[np.broadcast_to(braked, len(coefficients))] = np.nan
     if model == "full":
         rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
-        modes = _of_full(rotor, spring, posture, direction, design, shape, encoders)
+        modes = _modes_of_full(rotor, spring, posture, direction, design, shape, encoders)
         r_m, r_k, share = coefficients[each].T[:, :, None]
         decay = 0.5 * (r_m + r_k * modes.frequency_squared) + share * np.sqrt(modes.frequency_squared)
         modes = replace(modes, decay=decay)
@@ -104,7 +105,7 @@ def rendered_modes(
             rigid = ~np.isfinite(spring).any(axis=1)
             coefficients[np.broadcast_to(rigid, len(coefficients))] = np.nan
         numbers = effective_parameters(mechanism, posture, direction)
-        modes = _of_reduced(numbers, model, coefficients[each])
+        modes = _modes_of_reduced(numbers, model, coefficients[each])
     modes.input[np.isnan(modes.decay).any(axis=-1)] = np.nan
     return modes
 
@@ -129,6 +130,7 @@ def _coefficients(mechanism: Mechanism, damping: Damping) -> Floats:
     stiffness, damper = (
         per_design(mechanism, each, 1) for each in (mechanism.drives.stiffness, mechanism.drives.damping)
     )
+    # given dampers leave the modes apart where they are in proportion to the springs, by one share in all drives
     flexible = np.isfinite(stiffness)
     share = np.where(flexible, damper / np.where(flexible, stiffness, 1.0), np.nan)
     first = np.argmax(flexible, axis=1)
@@ -138,32 +140,36 @@ def _coefficients(mechanism: Mechanism, damping: Damping) -> Floats:
     return out
 
 
-def _of_reduced(numbers: EffectiveParameters, model: Model, coefficients: Floats) -> RenderedModes:
+def _modes_of_reduced(numbers: EffectiveParameters, model: Model, coefficients: Floats) -> RenderedModes:
     """Modes of the reduced models, masses and a spring: with the pair's reduced mass mu, w^2 = k/mu.
 
-    The two masses' own ratio is that of their mode; the motor mass keeps the damper of the pair (`reduction`)."""
+    The two masses' own ratio is that of their mode; the motor mass keeps the damper of the pair (`reduction`).
+
+    coefficients  (N, 3)  r_m [1/s], r_k [s] and damping ratio of each posture
+    """
     r_m, r_k, ratio = coefficients.T
     m1, m2 = numbers.link_side_mass.ravel(), numbers.motor_side_mass.ravel()
     k, mass = numbers.stiffness.ravel(), numbers.rigid_mass.ravel()
+    # of each mode: decay, squared frequency, participation of force and reading, that of the handle
     if model == "rigid":
         modes = [(0.5 * r_m + 0.0 * mass, 0.0 * mass, 1.0 / np.sqrt(mass), 1.0 / np.sqrt(mass))]
     else:
         mu = 1.0 / (1.0 / m1 + 1.0 / m2)
-        own = 2.0 * ratio * np.sqrt(k * mu) + r_k * k  # the damper between them
+        damper = 2.0 * ratio * np.sqrt(k * mu) + r_k * k  # the damper between them
         if model == "motor-mass":
-            modes = [(0.5 * (r_m + own / m2), k / m2, 1.0 / np.sqrt(m2), np.nan * m2)]  # holds the handle fixed
+            modes = [(0.5 * (r_m + damper / m2), k / m2, 1.0 / np.sqrt(m2), np.nan * m2)]  # holds the handle fixed
         else:
             free = 1.0 / np.sqrt(m1 + m2)
             modes = [
                 (0.5 * r_m + 0.0 * m1, 0.0 * m1, free, free),
-                (0.5 * (r_m + own / mu), k / mu, np.sqrt(mu) / m2, -np.sqrt(mu) / m1),
+                (0.5 * (r_m + damper / mu), k / mu, np.sqrt(mu) / m2, -np.sqrt(mu) / m1),
             ]
     decay, squared, participation, handle = (np.stack(part, axis=-1) for part in zip(*modes, strict=True))
     participation = np.where(np.isfinite(participation) & np.isfinite(squared), participation, np.nan)
     return RenderedModes(decay, squared, participation, participation.copy(), handle)
 
 
-def _of_full(
+def _modes_of_full(
     rotor: Floats,
     spring: Floats,
     posture: Posture,
@@ -172,7 +178,8 @@ def _of_full(
     shape: tuple[int, ...],
     encoders: Encoders,
 ) -> RenderedModes:
-    """Modes of the full model, undamped; rotor inertias and springs (P, d) at the joints."""
+    """Modes of the full model, undamped; rotor inertias and springs (P, d) at the joints, design (N,) of each of
+    the postures, whose shape is (...)."""
     d = rotor.shape[1]
     N, m = len(design), int(np.isfinite(spring).sum(axis=1).max(initial=0)) + 1
     along = np.broadcast_to(lever_arms(posture, screw(direction)), (*shape, d))
@@ -203,8 +210,13 @@ def _full_modes(
     first: int,
     last: int,
 ) -> None:
-    """The flexible modes of postures first to last - 1 and, last of each, the free motion; nan where no number
-    comes out. A design with rigid drives has fewer modes than others: the rest do not move."""
+    """Fill squared frequencies and participations of force, reading and handle (N, m) of some postures.
+
+    For postures first to last - 1 these are their flexible modes and, last of each, the free motion; nan as
+    `enter` where no number comes out. A design with rigid drives has fewer modes than others: the rest are 0.
+
+    mass (N, d, d), along (N, d)  of the links, lever arms;   rotors, springs (P, d)  at the joints of each design
+    """
     d, most = along.shape[1], squared.shape[1] - 1
     M, inverse, h, shape = np.empty((d, d)), np.empty((d, d)), np.empty(d), np.empty(d)
     flexible = np.empty(d, dtype=np.int64)
@@ -272,7 +284,8 @@ def _full_modes(
 
 @compiled_lean
 def invert(A: Floats, out: Floats) -> None:
-    """The inverse of a symmetric positive definite A (d, d), by Gauss and Jordan; A is overwritten."""
+    """The inverse of a symmetric positive definite A (d, d) into out (d, d), by Gauss and Jordan; A is
+    overwritten."""
     d = A.shape[0]
     for i in range(d):
         for j in range(d):
@@ -333,7 +346,7 @@ class PolePairs:
     frequency_squared  (N, m)  w^2 [1/s²]; 0 for a free motion
     position, velocity (N, m)  share of each part in the reading [1/kg], [s/kg]; velocity 0 for undamped shapes
     reach              (N,)    the reading that all participations together could have [1/kg], by which rounding is
-                               told; nan for a plant that is to be looked at alone
+                               told; nan for a plant that has to be computed by itself, otherwise
     """
 
     decay: Floats
@@ -344,17 +357,17 @@ class PolePairs:
 
     def with_free_motion(self, share: Floats) -> PolePairs:
         """The same plants with one more part each, a free mass with these shares in the reading (N,) [1/kg]."""
-        none = np.zeros((len(share), 1))
+        zeros = np.zeros((len(share), 1))
         return PolePairs(
-            np.hstack([self.decay, none]),
-            np.hstack([self.frequency_squared, none]),
+            np.hstack([self.decay, zeros]),
+            np.hstack([self.frequency_squared, zeros]),
             np.hstack([self.position, share[:, None]]),
-            np.hstack([self.velocity, none]),
+            np.hstack([self.velocity, zeros]),
             self.reach,
         )
 
     def with_rows(self, rows: Ints, others: PolePairs) -> PolePairs:
-        """The same pairs, but those of some plants, one for each of the rows, taken from others."""
+        """The same pairs, but plants number rows (k,) taken from those of `others`, of k plants in this order."""
         most = max(self.decay.shape[1], others.decay.shape[1])
         merged = {}
         for name in ("decay", "frequency_squared", "position", "velocity"):

@@ -49,7 +49,7 @@ class MeasuredPath:
 
 
 def mean_path(paths: Sequence[MeasuredPath]) -> MeasuredPath:
-    """Repetitions of one path, and their mean; a frequency is as coherent as in the worst of them."""
+    """Repetitions of one path as one, with their mean; a frequency is as coherent as in the worst of them."""
     sweeps = np.array([path.value for path in paths])
     known = [path.coherence for path in paths if path.coherence is not None]
     return MeasuredPath(sweeps.mean(axis=0), np.min(known, axis=0) if known else None, sweeps)
@@ -191,15 +191,15 @@ def integrators_of(response: Response, period: float) -> int:
     good = usable_frequencies(response)
     f, P = response.frequency[good], response.value[good]
     lowest = slice(0, max(3, int(np.searchsorted(f, 2.0 * f[0], side="right"))))
-    d = np.exp(2j * np.pi * f[:3] * period) - 1.0
-    whole = P[:3] * d ** np.arange(3)[:, None]
-    phases = np.angle(np.sum(whole / np.abs(whole), axis=1))
-    fall = -float(np.polyfit(np.log(f[lowest]), np.log(np.abs(P[lowest])), 1)[0])
+    z_less_1 = np.exp(2j * np.pi * f[:3] * period) - 1.0
+    P_times_power = P[:3] * z_less_1 ** np.arange(3)[:, None]
+    phases = np.angle(np.sum(P_times_power / np.abs(P_times_power), axis=1))
+    exponent = -float(np.polyfit(np.log(f[lowest]), np.log(np.abs(P[lowest])), 1)[0])
     measured = np.degrees(np.angle(P[0]))
     where = f"the phase is {measured:.0f} degrees at {f[0]:.6g} Hz, the lowest frequency"
     nearest = int(np.argmin(np.abs(phases)))
     clear, settled = abs(phases[nearest]) < CLEAR, abs(phases[nearest]) < SETTLED
-    unlike = abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5
+    unlike = abs(exponent - nearest) > UNLIKE and 0.0 <= exponent <= 2.5
     fit = low_frequencies(response) if unlike or not settled else None
     if fit is not None and fit.first_seen and fit.first_seen[1] < 0.0 and fit.terms[2] < 0.0:
         raise ResponseError(
@@ -208,8 +208,8 @@ def integrators_of(response: Response, period: float) -> int:
         )
     if clear and unlike and not (fit and fit.closely and fit.integrators is not None):
         raise ResponseError(
-            f"{where}, but the magnitude falls like f^-{fall:.1f} there, which goes with "
-            f"{-90 * min(round(fall), 2)} degrees; are columns swapped, or is this no force to position?"
+            f"{where}, but the magnitude falls like f^-{exponent:.1f} there, which goes with "
+            f"{-90 * min(round(exponent), 2)} degrees; are columns swapped, or is this no force to position?"
         )
     if response.integrators is not None:
         _check_stated(response.integrators, phases, nearest, clear, where)
@@ -289,13 +289,16 @@ def _scatter(sweeps: Complexes, mean: Complexes) -> Floats:
     """Variance (n,) of the mean of sweeps (k, n), over |mean|^2, by their scatter and that of their neighbours."""
     repeated = len(sweeps)
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = np.sum(np.abs(sweeps / mean - 1.0) ** 2, axis=0) / ((repeated - 1) * repeated)
-    padded = np.pad(np.where(np.isfinite(own), own, 0.0), POOLED // 2, mode="reflect")
-    return np.asarray(np.fmax(own, np.convolve(padded, np.full(POOLED, 1.0 / POOLED), mode="valid")))
+        single = np.sum(np.abs(sweeps / mean - 1.0) ** 2, axis=0) / ((repeated - 1) * repeated)
+    padded = np.pad(np.where(np.isfinite(single), single, 0.0), POOLED // 2, mode="reflect")
+    return np.asarray(np.fmax(single, np.convolve(padded, np.full(POOLED, 1.0 / POOLED), mode="valid")))
 
 
 def _radius(variance: Floats, freedom: Floats, count: int) -> Floats:
-    """Radius (n,) that one of `count` errors of these variances (n,) exceeds with 5 %."""
+    """Radius (n,) that any of `count` errors of these variances (n,) exceeds with a probability of 5 %.
+
+    freedom  (n,)  complex values from which each variance is known; inf: exactly
+    """
     exponent = np.log(count / (1.0 - CONFIDENCE))
     known = np.isinf(freedom)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -341,7 +344,8 @@ class LowFrequencies:
     closely: bool
 
     def inverse(self, frequency: Floats, integrators: int) -> Complexes:
-        """1 / P (...) at frequencies [Hz] with this number of poles at z = 1: terms below are none."""
+        """1 / P (...) [N/m] at frequencies (...) [Hz] with this number of poles at z = 1: that many first terms
+        are 0."""
         s = 2j * np.pi * np.asarray(frequency)[..., None]
         order = np.arange(TERMS)
         return np.asarray(np.sum(np.where(order < integrators, 0.0, self.terms) * s**order, axis=-1))
@@ -349,14 +353,15 @@ class LowFrequencies:
     def deviation(self, frequency: Floats) -> Floats:
         """Standard deviation (...) of 1 / P at frequencies [Hz], of its real and imaginary part together [N/m]."""
         s = (2.0 * np.pi * np.asarray(frequency))[..., None] ** np.arange(TERMS)
-        sign = np.array([1.0, 1.0, -1.0, -1.0])
+        sign = np.array([1.0, 1.0, -1.0, -1.0])  # i^n is 1, i, -1, -i: even terms are real, odd ones imaginary
         even, odd = s * sign * [1.0, 0.0, 1.0, 0.0], s * sign * [0.0, 1.0, 0.0, 1.0]
         squares = [np.einsum("...i,ij,...j->...", part, self.covariance, part) for part in (even, odd)]
         return np.asarray(np.sqrt(np.maximum(squares[0] + squares[1], 0.0)))
 
     @property
     def first_seen(self) -> tuple[int, float] | None:
-        """Number of the first term that is seen at the lowest frequency, and its sign; None: nothing fits."""
+        """Which term is the first that is seen at the lowest frequency, 0 for k, 1 for b, 2 for m, and its sign;
+        None: nothing fits."""
         scale = (2.0 * np.pi * self.lowest) ** np.arange(TERMS)
         size, error = self.terms * scale, np.sqrt(np.diag(self.covariance)) * scale
         seen = np.abs(size) > np.maximum(SEEN_SHARE * np.max(np.abs(size[:3])), SEEN_DEVIATIONS * error)
@@ -365,7 +370,8 @@ class LowFrequencies:
 
     @property
     def integrators(self) -> int | None:
-        """Poles of P at z = 1: the number of the first term that is seen, if it is positive; None: unclear."""
+        """Poles of P at z = 1: as many as terms are not seen before the first one, if that is positive; None:
+        unclear."""
         return self.first_seen[0] if self.first_seen and self.first_seen[1] > 0.0 else None
 
 
@@ -398,7 +404,8 @@ def fit_low_frequencies(frequency: Floats, value: Complexes, deviation: Floats |
 
 
 def _fit(f: Floats, P: Complexes, error: Floats) -> tuple[Floats, Floats, Floats]:
-    """Terms of the fit, their covariance, and how far P times the fit is from 1 at each frequency f [Hz]."""
+    """Terms (4,) of the fit, their covariance (4, 4), and how far P times the fit is from 1 (n,) at frequencies f
+    (n,) [Hz]; error (n,) is the deviation of P over |P|."""
     scale = (2.0 * np.pi * f[-1]) ** np.arange(TERMS)
     equations = P[:, None] * (2j * np.pi * f[:, None]) ** np.arange(TERMS) / scale
     weighted = np.concatenate([equations.real, equations.imag]) / np.tile(error, 2)[:, None]

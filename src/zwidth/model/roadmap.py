@@ -4,6 +4,9 @@ A straight way from the reference to a goal may be blocked although the goal can
 coincident base axes has a hole in the middle of its workspace. The flood goes round, because every node is
 reached from a neighbour one small turn of one drive away, closing the loops again and never passing a
 singularity. Newton then starts from the node nearest to the goal, which is also what makes batches fast.
+
+Shapes have the letters of `MechanismArrays`, and goals g numbers: the handle's position [m], the vector of its
+orientation [rad], or one after the other.
 """
 
 from __future__ import annotations
@@ -69,7 +72,7 @@ class Roadmap:
     search: cKDTree
 
     def node_of_cell(self, target: Floats) -> Ints:
-        """Node near each target (N, g): that of its cell, in constant time."""
+        """Index (N,) of a node near each target (N, g): that of its cell, in constant time."""
         if not len(self.nearest):
             return self.nearest_nodes(target, 1)[:, 0]
         finite = np.nan_to_num((target - self.low) / self.pitch, nan=0.0, posinf=0.0, neginf=0.0)
@@ -78,7 +81,8 @@ class Roadmap:
         return nodes
 
     def nearest_nodes(self, target: Floats, count: int) -> Ints:
-        """The nodes truly nearest to each target, (N, count), for targets that the first node missed."""
+        """Indices (N, count) of the nodes truly nearest to each target (N, g), for those that the first node
+        missed."""
         near = np.nan_to_num(target * self.scale, nan=0.0, posinf=0.0, neginf=0.0)
         count = min(count, len(self.angles))
         return np.asarray(self.search.query(near, k=count)[1], dtype=np.int64).reshape(len(target), count)
@@ -95,13 +99,13 @@ class _Contents:
 
 def roadmap(mech: MechanismArrays, design: int, reference: Floats) -> Roadmap:
     """The roadmap of one design from its reference posture (n,); kept, since many questions share it."""
-    own = one_design(mech, design)
+    geometry = one_design(mech, design)
     # what a body weighs decides nothing here: the same geometry finds its roadmap again, a changed one makes its
     # own
-    empty = {name: np.zeros_like(getattr(own, name)) for name in ("mass", "center_of_mass", "inertia")}
-    own = own._replace(bodies=np.zeros(0, dtype=np.int64), **empty)
-    arrays = [np.asarray(array) for array in (*own, reference)]
-    return _build(_Contents(tuple((array.shape, array.tobytes()) for array in arrays), own, reference.copy()))
+    empty = {name: np.zeros_like(getattr(geometry, name)) for name in ("mass", "center_of_mass", "inertia")}
+    geometry = geometry._replace(bodies=np.zeros(0, dtype=np.int64), **empty)
+    arrays = [np.asarray(array) for array in (*geometry, reference)]
+    return _build(_Contents(tuple((array.shape, array.tobytes()) for array in arrays), geometry, reference.copy()))
 
 
 @lru_cache(maxsize=16)
@@ -119,9 +123,10 @@ def _build(contents: _Contents) -> Roadmap:
     low, high = goals.min(axis=0)[:3], goals.max(axis=0)[:3]
     extent = np.maximum(high - low, 1e-9 * size)
     if mech.controls == POSE:
-        none = np.zeros(0, dtype=np.int64)
-        return Roadmap(angles, position, goals, none, low, extent, np.ones(3, dtype=np.int64), scale, search)
+        no_cells = np.zeros(0, dtype=np.int64)
+        return Roadmap(angles, position, goals, no_cells, low, extent, np.ones(3, dtype=np.int64), scale, search)
     long = extent > 1e-6 * size
+    # cubes, as many as CELLS in the axes along which goals differ
     pitch = (np.prod(extent[long]) / CELLS) ** (1 / max(1, long.sum())) if long.any() else 1.0
     counts = np.where(long, np.clip(np.ceil(extent / pitch), 1, CELLS), 1).astype(np.int64)
     centres = [low[x] + (np.arange(counts[x]) + 0.5) * extent[x] / counts[x] for x in range(3)]
@@ -131,7 +136,7 @@ def _build(contents: _Contents) -> Roadmap:
 
 
 def _goals(mech: MechanismArrays, position: Floats, rotation: Floats) -> Floats:
-    """Goals (K, g) of handle positions (K, 3) and axes (K, 3, 3)."""
+    """Goals (K, g), as of `Roadmap`, of handle positions (K, 3) and axes (K, 3, 3)."""
     if mech.controls == POSITION:
         return position
     turned = rotation_vector(rotation)
@@ -140,7 +145,8 @@ def _goals(mech: MechanismArrays, position: Floats, rotation: Floats) -> Floats:
 
 @compiled_lean
 def close_loops(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> bool:
-    """Close the loops with the drives held (in place); False where Newton leaves the branch."""
+    """Close the loops from joint coordinates angles (n,) (in place) with the drives held; False where Newton
+    leaves the branch, or near a singularity."""
     loops, last, moved = mech.first_row[mech.a.size], 0.0, 0.0
     for iteration in range(12):
         place_links(mech, 0, angles, work)
@@ -162,7 +168,7 @@ def close_loops(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> b
 
 @compiled_lean
 def begin_to_turn(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
-    """Fill `rows` and `rates` at joint coordinates, from which `turn_drive` starts."""
+    """Fill `work.rows` and `work.rates` at joint coordinates angles (n,), from which `turn_drive` starts."""
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
     passive_rates(mech, 0, work)
@@ -172,9 +178,10 @@ def begin_to_turn(mech: MechanismArrays, angles: Floats, work: WorkingMemory) ->
 def turn_drive(
     mech: MechanismArrays, angles: Floats, drive: int, turn: float, margin: float, work: WorkingMemory
 ) -> bool:
-    """Turn one drive a little, in its unit, and close the loops (in place); False where that leads to or past a
-    singularity, or beyond a joint's limit.
+    """Turn one drive a little, in its unit, and close the loops, joint coordinates angles (n,) (in place); False
+    where that leads to or past a singularity, or beyond a joint's limit.
 
+    margin  reciprocal condition below which a posture counts as singular
     `rows` and `rates` belong to the posture before, as `begin_to_turn` or a turn that succeeded leaves them.
     """
     rates, step, m = work.rates, work.solution[0], work.rows.shape[0]

@@ -53,8 +53,9 @@ def roll_pitch_yaw_of(turn: Floats) -> Floats:
     yaw = float(np.arctan2(turn[1, 0], turn[0, 0])) if across > ROUNDING else 0.0
     pitch = float(np.arctan2(-turn[2, 0], across))
     c, s = np.cos(yaw), np.sin(yaw)
-    left = c * turn[1] - s * turn[0]
-    roll = float(np.arctan2(-left[2], left[1]))
+    # second row of Rz(-yaw) turn = Ry(pitch) Rx(roll): (0, cos roll, -sin roll)
+    rolled = c * turn[1] - s * turn[0]
+    roll = float(np.arctan2(-rolled[2], rolled[1]))
     angles = np.array([roll, pitch, yaw])
     angles[np.abs(angles) < ROUNDING] = 0.0
     return angles
@@ -85,7 +86,7 @@ def turned_further(v: tuple[float, float, float], turn: tuple[float, float, floa
     """The vector of Exp(v) Exp(turn): a link at v, turned about its own axes."""
     a, ax, ay, az = _quaternion(v)
     b, bx, by, bz = _quaternion(turn)
-    return _vector(
+    return _vector_of_quaternion(
         a * b - ax * bx - ay * by - az * bz,
         a * bx + b * ax + ay * bz - az * by,
         a * by + b * ay + az * bx - ax * bz,
@@ -93,9 +94,9 @@ def turned_further(v: tuple[float, float, float], turn: tuple[float, float, floa
     )
 
 
-# Unit quaternion w, x, y, z of a rotation vector [rad].
 @compiled_lean
 def _quaternion(v: tuple[float, float, float]) -> tuple[float, float, float, float]:
+    """Unit quaternion w, x, y, z of a rotation vector [rad]."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     angle = sqrt(square)
     share = 0.5 - square / 48.0 if angle < 1e-4 else sin(0.5 * angle) / angle
@@ -103,7 +104,7 @@ def _quaternion(v: tuple[float, float, float]) -> tuple[float, float, float, flo
 
 
 @compiled_lean
-def _vector(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _vector_of_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Rotation vector [rad] of a unit quaternion w, x, y, z; of its two signs the one with the smaller turn."""
     length = sqrt(x * x + y * y + z * z)
     share = 2.0 / w if length == 0.0 else 2.0 * atan2(length, abs(w)) / length * (1.0 if w >= 0.0 else -1.0)
@@ -134,7 +135,7 @@ def vector_between(A: Floats, B: Floats) -> tuple[float, float, float]:
     else:
         w, x, y = r10 - r01, r02 + r20, r12 + r21
     over = 1.0 / sqrt(w * w + x * x + y * y + z * z)
-    return _vector(over * w, over * x, over * y, over * z)
+    return _vector_of_quaternion(over * w, over * x, over * y, over * z)
 
 
 @compiled_lean
