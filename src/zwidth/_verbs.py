@@ -1,7 +1,10 @@
 """The functions behind the methods of `Device` and `OperatingPoint`: the one module that may import upwards.
 
 `point.chart()` reads better than `chart_at(point)`, but an operating point may not import charts. Each function
-here imports the function of the same task when it is called, calls it, and does nothing else.
+here imports the function of the same task when it is called, calls it, and does nothing else. Arguments and
+results are those of the method, whose docstring has them: `Device.X` for `device_X`, `Loop.X` for `loop_X`,
+`MultiLoop.X` for `multi_X`, `Result.X` for `plot` and `notebook`, and `OperatingPoint.X` for the others.
+`environment_named` is for pickle.
 """
 
 from __future__ import annotations

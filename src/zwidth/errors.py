@@ -106,7 +106,7 @@ class ArgumentError(ZwidthError, ValueError):
 
 
 def _subject(argument: str, reason: str) -> str:
-    """What stands before a reason: the argument as its subject where it begins with a verb, else with a colon."""
+    """What stands before a reason: the argument, with a colon unless the reason begins with a verb; "" without."""
     verbs = ("must ", "is ", "needs ", "does ", "lies ", "differ ")
     return f"{argument}{' ' if reason.startswith(verbs) else ': '}" if argument else ""
 

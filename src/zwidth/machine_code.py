@@ -58,6 +58,7 @@ class MachineCode(_Cache):
         """The kernel for one signature, ready to be called; None where it must be compiled."""
         target.refresh()
         triple, name, features = target.codegen().magic_tuple()
+        # each folder, and the processor that its kernels are compiled for
         places = [(written_folder(), (name, features)), (SHIPPED, GENERIC)]
         for folder, processor in places:
             if folder is not None:
@@ -91,7 +92,7 @@ class MachineCode(_Cache):
         """Name of the file: the kernel's name, a digest of argument types and processor, and one of its source."""
         if self._source is None:
             options = sorted(self._options.items())
-            self._source = _digest(FORMAT, numba.__version__, options, *_source(self._function))
+            self._source = _digest(FORMAT, numba.__version__, options, *_source_lines(self._function))
         kinds = signature if isinstance(signature, tuple) else signature.args
         use = _digest(triple, processor, *(_type_text(kind) for kind in kinds))
         module = (self._function.__module__ or "").removeprefix("zwidth.")
@@ -183,8 +184,11 @@ def _write(file: Path, data: bytes) -> None:
 
 
 def _reduced(result: CompileResult) -> tuple[Any, ...]:
-    """The parts of a compiled kernel from which `_restored` makes it again. Its intermediate code is left out: no
-    kernel is inlined into another from disk."""
+    """The parts of a compiled kernel from which `_restored` makes it again: name of the library, machine code,
+    names that it defines, numba's description, environment and signature.
+
+    Its intermediate code is left out: no kernel is inlined into another from disk.
+    """
     result.fndesc.typemap = result.fndesc.calltypes = None  # large, and not used any more
     library = result.library
     module = library._final_module
@@ -198,7 +202,7 @@ def _reduced(result: CompileResult) -> tuple[Any, ...]:
 
 
 def _restored(target: Any, parts: tuple[Any, ...]) -> CompileResult:
-    """The compiled kernel of these parts, as returned by numba's compiler."""
+    """The compiled kernel of the parts by `_reduced`, as returned by numba's compiler; target  numba's context."""
     name, machine_code, names, description, environment, signature = parts
     codegen = target.codegen()
     library = codegen.create_library(name)
@@ -226,6 +230,7 @@ def _restored(target: Any, parts: tuple[Any, ...]) -> CompileResult:
 
 
 def _digest(*parts: Any) -> str:
+    """SHA-256 of the parts' texts, in hexadecimal."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
@@ -237,7 +242,7 @@ def _type_text(kind: Any) -> str:
     return str(kind)
 
 
-def _source(function: Callable[..., Any]) -> list[str]:
+def _source_lines(function: Callable[..., Any]) -> list[str]:
     """Lines that state all that the machine code of a function depends on: its instructions and constants, and
     those of the functions that it calls."""
     visited: dict[int, None] = {}

@@ -81,13 +81,13 @@ def documented(unit: str = "", **how: Any) -> Callable[[Function], Function]:
 
 @cache
 def entries_of(kind: type) -> dict[str, tuple[str, Entry]]:
-    """Key and entry by attribute of a dataclass, in the order of the document: those of its bases first."""
+    """Key and entry of each attribute of a dataclass that its document has, in order; those of its bases first."""
     of_fields: dict[str, Mapping[Any, Any]] = {one.name: one.metadata for one in fields(kind)}
     found: dict[str, Entry] = {}
     for base in reversed(kind.__mro__):
-        own = vars(base)
-        stated = [(name, of_fields[name]) for name in own.get("__annotations__", ()) if name in of_fields]
-        for name, member in own.items():
+        members = vars(base)
+        stated = [(name, of_fields[name]) for name in members.get("__annotations__", ()) if name in of_fields]
+        for name, member in members.items():
             function = getattr(member, "fget", None) or getattr(member, "func", None)  # of a cached property
             stated.append((name, getattr(function, "__dict__", {})))
         found |= {name: metadata["entry"] for name, metadata in stated if "entry" in metadata}

@@ -92,13 +92,13 @@ class _TupleReferenceModel(models.PrimitiveModel):
 
 @lower_cast(types.BaseNamedTuple, TupleReference)
 def _write(context: Any, builder: Any, kind: types.Type, reference: TupleReference, value: Any) -> Any:
-    """Write a tuple to the stack. Returns its address."""
+    """Code that writes a tuple to the stack; returns its address."""
     return builder.bitcast(cgutils.alloca_once_value(builder, value), cgutils.voidptr_t)
 
 
 @lower_cast(TupleReference, types.BaseNamedTuple)
 def _read_whole(context: Any, builder: Any, reference: TupleReference, kind: types.Type, address: Any) -> Any:
-    """The tuple at an address."""
+    """Code that reads the whole tuple at an address."""
     place = builder.bitcast(address, context.get_value_type(kind).as_pointer())
     return impl_ret_borrowed(context, builder, kind, builder.load(place))
 
@@ -118,7 +118,7 @@ class _FieldType(AttributeTemplate):
 
 @lower_getattr_generic(TupleReference)
 def _read(context: Any, builder: Any, reference: TupleReference, address: Any, name: str) -> Any:
-    """A field: what stands there, or the address of a tuple within the tuple."""
+    """Code that reads a field by its name: what stands there, or the address of a tuple within the tuple."""
     index = reference.fields.fields.index(name)
     kind = reference.fields[index]
     # by the distance in bytes: the type of the whole tuple, written out, has thousands of characters

@@ -99,69 +99,77 @@ def find_stable_walls(
     box     look here only; None: everywhere between millionths and all of what the device's mass allows
     Raises  NoAnswerError  where no stable wall with K > 0 is found
     """
-    _check(box)
+    _check_window(box)
     tell = progress or (lambda done, of: None)
     tell(0, ZOOMS + 2)
-    patch = _raster_region(trial, box)
+    patch = _stable_patch(trial, box)
     tell(1, ZOOMS + 2)
-    columns = _columns(trial, patch, box)
+    # a column: a damping, and the largest stable stiffness at it
+    columns = _largest_stiffnesses_of_patch(trial, patch, box)
     tell(2, ZOOMS + 2)
     if not columns:
-        raise NoAnswerError(_none(box))
-    reach = max(B for B, _, _ in columns)
-    best = max(columns, key=lambda column: column[1])
-    within = _within(box)
-    # powers pass a peak between them
+        raise NoAnswerError(_no_wall_message(box))
+    reach = max(column.damping for column in columns)
+    best = max(columns, key=lambda column: column.stiffness)
+    within = _stiffness_range(box)
+    # a raster of powers of ten may miss a peak between two of its dampings
     between = np.linspace(0.0, 1.3 * reach, COLUMNS + 1)[1:] if box is None else np.empty(0)
-    tops = np.interp(between, [B for B, _, _ in columns], [K for _, K, _ in columns])
+    tops = np.interp(between, [column.damping for column in columns], [column.stiffness for column in columns])
     more = _largest_stiffnesses(trial, between, 0.5 * tops, FIRST_ZOOM, within, levels=COARSE)
-    columns = sorted({*columns, *(column for column in more if column[1] > 0.0)})
-    reach, best = max(B for B, _, _ in columns), max(columns, key=lambda column: column[1])
-    best = _close_in(trial, box, columns, best, tell)
-    return StableExtent(best[1], best[0], reach, best[2])
+    columns = sorted({*columns, *(column for column in more if column.stiffness > 0.0)})
+    reach = max(column.damping for column in columns)
+    best = max(columns, key=lambda column: column.stiffness)
+    best = _close_in_on_tip(trial, box, columns, best, tell)
+    return StableExtent(best.stiffness, best.damping, reach, best.bounded)
 
 
-def _close_in(
+def _close_in_on_tip(
     trial: StabilityTrial, box: SearchWindow | None, columns: list[_Column], best: _Column, tell: Progress
 ) -> _Column:
     """Close in on the tip, from the best of some columns, by rounds of dampings ever closer together.
 
     columns  by damping, best one of them; the list is changed
     tell     called with the number of steps done, and of all six
-    Returns  damping [N s/m] and largest stable stiffness [N/m] of the tip, and whether an unstable wall was found
+    Returns  the column of the tip
     Raises   NoAnswerError  where, seen for longer, none of the columns is stable
     """
-    within = _within(box)
+    within = _stiffness_range(box)
     zoom = 0
-    while zoom < ZOOMS and best[2]:
+    while zoom < ZOOMS and best.bounded:
         index = columns.index(best)
         low, high = columns[max(index - 1, 0)], columns[min(index + 1, len(columns) - 1)]
-        between = np.linspace(low[0], high[0], ZOOMED + 2)[1:-1]
-        B = np.unique(np.append(between, best[0]))
-        start = np.full(len(B), 0.9 * min(column[1] for column in (low, best, high)))
-        # dampings four times as close differ by a sixteenth in stiffness
+        between = np.linspace(low.damping, high.damping, ZOOMED + 2)[1:-1]
+        B = np.unique(np.append(between, best.damping))
+        start = np.full(len(B), 0.9 * min(column.stiffness for column in (low, best, high)))
+        # at a smooth peak, dampings four times as close differ by a sixteenth in stiffness
         tolerance = max(FIRST_ZOOM / 16.0**zoom, 0.01 * ACCURACY)
         fresh = [
-            c for c in _largest_stiffnesses(trial, B, start, tolerance, within, best[1] - start) if c[1] > 0.0
+            column
+            for column in _largest_stiffnesses(trial, B, start, tolerance, within, best.stiffness - start)
+            if column.stiffness > 0.0
         ]
-        if not fresh:  # seen for longer, nothing there is stable
+        if not fresh:  # observed for longer than in the coarse search, nothing there is stable
             columns.remove(best)
             if not columns:
-                raise NoAnswerError(_none(box))
-            best = max(columns, key=lambda column: column[1])
+                raise NoAnswerError(_no_wall_message(box))
+            best = max(columns, key=lambda column: column.stiffness)
             continue
-        best = max(fresh, key=lambda column: column[1])
+        best = max(fresh, key=lambda column: column.stiffness)
         columns = sorted({low, *fresh, high})
         zoom += 1
         tell(zoom + 2, ZOOMS + 2)
     return best
 
 
-# damping, largest stable stiffness, whether an unstable one was found
-_Column = tuple[float, float, bool]
+class _Column(NamedTuple):
+    """A damping [N s/m], the largest stable stiffness at it [N/m] (0: none), and whether an unstable was found."""
+
+    damping: float
+    stiffness: float
+    bounded: bool
 
 
-def _check(box: SearchWindow | None) -> None:
+def _check_window(box: SearchWindow | None) -> None:
     """Raise ArgumentError for a search window with an empty or infinite range, or without a stiffness above 0."""
     if box is None:
         return
@@ -173,12 +181,12 @@ def _check(box: SearchWindow | None) -> None:
         raise ArgumentError("stiffness", f"must reach above 0 [N/m], {got}")
 
 
-def _within(box: SearchWindow | None) -> tuple[float, float]:
-    """The softest and the stiffest wall to be looked at [N/m]."""
+def _stiffness_range(box: SearchWindow | None) -> tuple[float, float]:
+    """The softest and the stiffest wall to be tried [N/m]; 0 and inf for None."""
     return (0.0, np.inf) if box is None else (max(box.stiffness[0], 0.0), box.stiffness[1])
 
 
-def _none(box: SearchWindow | None) -> str:
+def _no_wall_message(box: SearchWindow | None) -> str:
     """Message: no stable wall was found in this search window, or anywhere for None."""
     where = (
         ""
@@ -191,16 +199,21 @@ def _none(box: SearchWindow | None) -> str:
     return f"no stable wall was found{where}: the disturbed device did not come to rest inside any of those tried"
 
 
-def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Floats, Floats, Flags]:
-    """Stiffnesses (k,), dampings (b,), and which walls (k, b) belong to the largest connected stable patch."""
+def _stable_patch(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Floats, Floats, Flags]:
+    """Try walls on a raster, on the linearised device, and find the largest connected patch of stable ones.
+
+    Returns  stiffnesses (k,) [N/m] and dampings (b,) [N s/m] of the raster; which walls (k, b) are in the patch
+    Raises   NoAnswerError  where none is stable
+    """
     from scipy.ndimage import label
 
     if box is None:
         plant = trial.loop.plant if trial.hand.operator is None else attach(trial.loop.plant, trial.hand.operator)
-        light, heavy = _masses(plant)
+        light, heavy = _sudden_and_steady_mass(plant)
         T = trial.loop.period
-        K = _powers(4.0 * heavy / T**2, SOFTEST * light / heavy)
-        B = _powers(4.0 * heavy / T, LEAST_DAMPED * light / heavy)
+        # up to 4 m/T^2 and 4 m/T, where even a free mass m is unstable; down to a share of the lighter mass's
+        K = _logarithmic_raster(4.0 * heavy / T**2, SOFTEST * light / heavy)
+        B = _logarithmic_raster(4.0 * heavy / T, LEAST_DAMPED * light / heavy)
     else:
         low = max(box.stiffness[0], 1e-3 * box.stiffness[1])
         K = np.geomspace(low, box.stiffness[1], 20)
@@ -211,31 +224,37 @@ def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Flo
         if stable.any():
             break
     else:
-        raise NoAnswerError(_none(box))
-    names, _ = label(stable.reshape(len(K), len(B)))
-    sizes = np.bincount(names.ravel())[1:]
-    return K, B, np.asarray(names == 1 + int(np.argmax(sizes)))
+        raise NoAnswerError(_no_wall_message(box))
+    patch_numbers, _ = label(stable.reshape(len(K), len(B)))  # 0: unstable
+    sizes = np.bincount(patch_numbers.ravel())[1:]
+    return K, B, np.asarray(patch_numbers == 1 + int(np.argmax(sizes)))
 
 
-def _powers(largest: float, least: float) -> Floats:
+def _logarithmic_raster(largest: float, least: float) -> Floats:
     """Values up to `largest`, evenly in the logarithm, PER_DECADE a decade, from its share `least` on."""
     count = int(np.ceil(-PER_DECADE * np.log10(least)))
     return np.asarray(largest * 10.0 ** (np.arange(-count, 1) / PER_DECADE))
 
 
-def _masses(plant: Plant) -> tuple[float, float]:
+def _sudden_and_steady_mass(plant: Plant) -> tuple[float, float]:
     """Mass that a sudden force at the wall accelerates, and the one that a steady force does [kg]."""
     inverse = np.linalg.inv(plant.mass)
-    a, s, shape = plant.actuator, plant.sensor, least_deforming_motion(plant)
-    light = 1.0 / float(np.sqrt((a @ inverse @ a) * (s @ inverse @ s)))
+    actuator, sensor, shape = plant.actuator, plant.sensor, least_deforming_motion(plant)
+    # geometric mean of the masses felt at the actuator and at the sensor
+    light = 1.0 / float(np.sqrt((actuator @ inverse @ actuator) * (sensor @ inverse @ sensor)))
     return light, max(float(shape @ plant.mass @ shape), light)
 
 
-def _columns(
+def _largest_stiffnesses_of_patch(
     trial: StabilityTrial, patch: tuple[Floats, Floats, Flags], box: SearchWindow | None
 ) -> list[_Column]:
-    """The largest stable stiffness at some of the patch's dampings, on the trial itself."""
+    """The largest stable stiffness at up to COLUMNS of the patch's dampings, on the trial itself, coarsely.
+
+    patch    as `_stable_patch` returns it
+    Returns  columns by damping; a damping at which no start within the patch is stable has none
+    """
     K, B, inside = patch
+    # tops: stiffest wall of the patch at each damping
     tops = np.array([K[column].max(initial=0.0) for column in inside.T])
     worth = np.flatnonzero(tops > WORTH * tops.max())
     filled = np.flatnonzero(tops > 0.0)
@@ -243,13 +262,14 @@ def _columns(
     some = filled[np.unique(np.linspace(0, len(filled) - 1, min(COLUMNS, len(filled))).astype(int))]
     top = np.array([K[np.flatnonzero(inside[:, b])[-1]] for b in some])
     least = np.array([K[np.flatnonzero(inside[:, b])[0]] for b in some])
-    within = _within(box)
+    within = _stiffness_range(box)
     columns_by_number = dict[int, _Column]()
+    # dampings whose first start was unstable are tried again from softer ones
     for start in (0.5 * top, 0.1 * top, least):
         lanes = [i for i in range(len(some)) if i not in columns_by_number]
         columns = _largest_stiffnesses(trial, B[some[lanes]], start[lanes], 0.05, within, levels=COARSE)
         for i, column in zip(lanes, columns, strict=True):
-            if column[1] > 0.0:
+            if column.stiffness > 0.0:
                 columns_by_number[i] = column
     return sorted(columns_by_number.values())
 
@@ -263,12 +283,14 @@ def _largest_stiffnesses(
     step: Floats | None = None,
     levels: int | None = None,
 ) -> list[_Column]:
-    """The largest stable stiffness at dampings B (m,), from a start that should be stable; 0 where it is not.
+    """The largest stable stiffness at dampings B (m,) [N s/m], from stiffnesses that should be stable.
 
-    Of a nonlinear device the lowest change counts, whatever `levels` (see `observe`) says.
+    For a nonlinear device the lowest change of the verdict counts, whatever `levels` (see `observe`) says.
 
-    tolerance  as a share of the start;   within  softest and stiffest wall [N/m];   step  (m,)  the first [N/m]
-    Returns    at each damping: it, the stiffness [N/m], and whether an unstable wall was found
+    start      (m,)  stiffnesses [N/m] where the march upwards begins
+    tolerance  of the result, as a share of the start;   within  softest and stiffest wall to be tried [N/m]
+    step       (m,)  the first of the march [N/m]; None: half the start
+    Returns    a column for each damping; stiffness 0 where the start is unstable
     """
     least, most = within
     m = len(B)
@@ -283,21 +305,23 @@ def _largest_stiffnesses(
         np.where(begins, start + brackets.stable, 0.0), start + brackets.unstable, brackets.observations
     )
     if not trial.linear:
-        brackets, _ = _recheck(trial, B, brackets, least, tolerance * np.minimum(start, brackets.stable))
-    return list(zip(B.tolist(), brackets.stable.tolist(), np.isfinite(brackets.unstable).tolist(), strict=True))
+        brackets, _ = _lowest_changes(trial, B, brackets, least, tolerance * np.minimum(start, brackets.stable))
+    columns = zip(B.tolist(), brackets.stable.tolist(), np.isfinite(brackets.unstable).tolist(), strict=True)
+    return [_Column(*column) for column in columns]
 
 
-def _recheck(
+def _lowest_changes(
     trial: StabilityTrial, damping: Floats, brackets: Brackets, least: float, tolerance: Floats
 ) -> tuple[Brackets, Flags]:
-    """The stiffnesses found at dampings (m,), or else the lowest at which the verdict changes.
+    """Replace the stiffnesses found at dampings (m,) by lower ones, where the verdict changes below them already.
 
-    least    no softer wall is looked at [N/m]
+    brackets  along stiffness [N/m];   least  softest wall to be tried [N/m];   tolerance  (m,) [N/m]
     Returns  as `brackets` [N/m], stable 0 where no stable wall was met; and at which dampings the verdict changed
     """
-    ways = stiffness_lines(damping, least)
+    lines = stiffness_lines(damping, least)
+    # as distances from the lines' start
     first = Brackets(brackets.stable - least, brackets.unstable - least, brackets.observations)
-    lower = nearest_change(trial, ways, first, tolerance, start_stable=False)
+    lower = nearest_change(trial, lines, first, tolerance, start_stable=False)
     stable = np.where(lower.stable > 0.0, least + lower.stable, 0.0)
     unsure = lower.stable < first.stable
     return Brackets(stable, least + lower.unstable, lower.observations), unsure
@@ -309,7 +333,8 @@ def measure_edges(
     """Lower and upper edge at each stiffness (k,), from the damping of the tip outwards.
 
     Of a nonlinear device: the change of the verdict nearest to that damping.
-    Returns  lower edges first; a stiffness at which that damping is not stable has none
+    place    extent of the stable walls;   box  as in `find_stable_walls`
+    Returns  lower edges first; a stiffness at which the tip's damping is not stable has none
     """
     k = len(stiffness)
     inside = np.full(k, place.damping)
@@ -339,7 +364,7 @@ def measure_edges(
     kinds: tuple[EdgeKind, EdgeKind] = ("lower", "upper")
     edges = [kind for kind in kinds for _ in range(k)]
     return [
-        _point(float(K), float(B), edge, observation, bool(doubt))
+        _edge_point(float(K), float(B), edge, observation, bool(doubt))
         for (K, _), B, edge, observation, doubt in zip(
             starts, middle, edges, brackets.observations, unsure, strict=True
         )
@@ -352,10 +377,14 @@ def measure_tips(
     """The largest stable stiffness at each damping (k,), from a stiffness somewhat below the tip's upwards.
 
     Of a nonlinear device: from a lower one where that is not stable, and the lowest change of the verdict.
+
+    place  extent of the stable walls, by `find_stable_walls`;   box  as there
+    Returns  a point for each damping at which the start is stable
     """
-    least, most = _within(box)
+    least, most = _stiffness_range(box)
+    # somewhat below the least stiffness that is measured; the first step of the march is to the tip's
     start = np.full(len(damping), (TIP_SHARE - 0.03) * place.stiffness)
-    start = _lowered(trial, damping, start, least)
+    start = _stable_starts(trial, damping, start, least)
     B, start = damping[start > 0.0], start[start > 0.0]
     lines = SearchLines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
     most = min(most, 1e3 * place.stiffness)
@@ -365,15 +394,20 @@ def measure_tips(
     brackets = Brackets(start + brackets.stable, start + brackets.unstable, brackets.observations)
     unsure = np.zeros(len(B), dtype=bool)
     if not trial.linear:
-        brackets, unsure = _recheck(trial, B, brackets, least, tolerance)
+        brackets, unsure = _lowest_changes(trial, B, brackets, least, tolerance)
         unsure |= stable_beyond(trial, stiffness_lines(B, least), brackets.unstable - least)
     middle = np.where(brackets.stable > 0.0, 0.5 * (brackets.stable + brackets.unstable), np.nan)
     ends = zip(middle.tolist(), B.tolist(), brackets.observations, unsure.tolist(), strict=True)
-    return [_point(K, b, "tip", observation if isfinite(K) else None, doubt) for K, b, observation, doubt in ends]
+    return [
+        _edge_point(K, b, "tip", observation if isfinite(K) else None, doubt) for K, b, observation, doubt in ends
+    ]
 
 
-def _lowered(trial: StabilityTrial, damping: Floats, start: Floats, least: float) -> Floats:
-    """Stiffnesses halved until their walls are stable, for a nonlinear device; 0 where none is."""
+def _stable_starts(trial: StabilityTrial, damping: Floats, start: Floats, least: float) -> Floats:
+    """Stiffnesses (m,) from which to march at dampings (m,): those of `start`, or 0 where the wall is unstable.
+
+    For a nonlinear device, unstable ones are first halved towards `least` [N/m] up to HALVED times.
+    """
     start = start.copy()
     lanes = np.arange(len(damping))
     for _ in range(1 if trial.linear else HALVED):
@@ -386,7 +420,9 @@ def _lowered(trial: StabilityTrial, damping: Floats, start: Floats, least: float
     return start
 
 
-def _point(K: float, B: float, edge: EdgeKind, observation: Observation | None, unsure: bool = False) -> EdgePoint:
+def _edge_point(
+    K: float, B: float, edge: EdgeKind, observation: Observation | None, unsure: bool = False
+) -> EdgePoint:
     """Point of the boundary at K [N/m], B [N s/m], with what its first unstable wall showed; None: it has none."""
     if observation is None:
         return EdgePoint(K, B, edge, None, float("nan"), float("nan"), unsure)
@@ -394,14 +430,18 @@ def _point(K: float, B: float, edge: EdgeKind, observation: Observation | None, 
 
 
 def tip_dampings(edges: list[EdgePoint], place: StableExtent, count: int) -> Floats:
-    """Dampings at which to measure the tip: the tip's own, and others between the two edges just below it."""
+    """Dampings at which to measure the tip: the tip's own, and others between the two edges just below it.
+
+    edges  lower and upper ones, by `measure_edges`
+    count  of dampings; only the tip's where one of the edges has no points
+    """
     at = TIP_SHARE * place.stiffness
     ends = []
     for edge in ("lower", "upper"):
-        own = [p for p in edges if p.edge == edge and isfinite(p.damping)]
-        if not own:
+        points = [p for p in edges if p.edge == edge and isfinite(p.damping)]
+        if not points:
             return np.array([place.damping])[:count]
-        K, B = (np.array(values) for values in zip(*sorted((p.stiffness, p.damping) for p in own), strict=True))
+        K, B = (np.array(values) for values in zip(*sorted((p.stiffness, p.damping) for p in points), strict=True))
         ends.append(float(np.interp(at, K, B)))
     spread = np.linspace(ends[0], ends[1], count + 1)[1:-1]  # none for a count of 1
     return np.asarray(np.sort(np.append(spread, place.damping)))
@@ -415,14 +455,17 @@ AFTER: Final = np.array([1.05, 1.2, 1.5])  # times the way to the first unstable
 
 
 class SearchLines(NamedTuple):
-    """Lines through the plane of walls: a start (m, 2), and the direction outwards (m, 2)."""
+    """m lines through the plane of walls: starts (m, 2) and directions outwards (m, 2), columns K and B.
+
+    Directions have length 1 along K [N/m] or B [N s/m], the unit of distances along the line.
+    """
 
     start: Floats
     outwards: Floats
 
-    def at(self, t: Floats) -> Floats:
-        """Walls (m, 2) on the lines at distances t (m,) from their starts."""
-        return np.asarray(self.start + t[:, None] * self.outwards)
+    def at(self, distances: Floats) -> Floats:
+        """Walls (m, 2), columns K [N/m] and B [N s/m], on the lines at distances (m,) from their starts."""
+        return np.asarray(self.start + distances[:, None] * self.outwards)
 
     def only(self, lanes: Flags | NDArray[np.intp]) -> SearchLines:
         """Those of the lines that flags (m,) or indices choose."""
@@ -430,7 +473,8 @@ class SearchLines(NamedTuple):
 
 
 class Brackets(NamedTuple):
-    """Along each line: the outermost stable place, the first unstable one (nan: none), and what was seen there."""
+    """Distances (m,) from each line's start: the outermost found stable, and the first found unstable (nan: none);
+    and what was observed at the unstable one (None: there is none)."""
 
     stable: Floats
     unstable: Floats
@@ -442,7 +486,7 @@ def march(
 ) -> Brackets:
     """Step outwards, twice as far each time, until a wall is unstable.
 
-    step      (m,)  the first;   farthest (m,)  no farther than this;   levels  see `observe`
+    step      (m,)  the first distance;   farthest (m,)  the largest;   levels  see `observe`
     """
     m = len(step)
     stable, unstable = np.zeros(m), np.full(m, np.nan)
@@ -466,7 +510,7 @@ def march(
 def bisect(
     trial: StabilityTrial, lines: SearchLines, brackets: Brackets, tolerance: Floats, levels: int | None = None
 ) -> Brackets:
-    """Halve the gap between stable and unstable until it is below the tolerance (m,)."""
+    """Halve the gap between stable and unstable until it is below the tolerance (m,); lines without one stay."""
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
     while True:
         lanes = unstable - stable > np.maximum(tolerance, 1e-12 * np.abs(unstable))
@@ -490,10 +534,13 @@ def stiffness_lines(damping: Floats, least: float) -> SearchLines:
 def nearest_change(
     trial: StabilityTrial, lines: SearchLines, brackets: Brackets, tolerance: Floats, *, start_stable: bool
 ) -> Brackets:
-    """Move the end of each line back to the first change of the verdict; ends with a stable way to them stay.
+    """Move each bracket back to the first change of the verdict along its line, if there is one before it.
+
+    Walls at SHARES of the distance to the bracket are tried; where none of them is stable, those at SHARES of the
+    distance to the first of them, up to LOWERED times.
 
     brackets      along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
-    start_stable  whether each line's start is known to be stable; if not, the way begins at the first stable wall
+    start_stable  True: each line's start is known to be stable; False: the first stable wall tried counts as start
     Returns       as `brackets`; stable 0 where no stable wall was met
     """
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
@@ -502,34 +549,41 @@ def nearest_change(
     for _ in range(LOWERED):
         if not len(lanes):
             break
-        t = SHARES * top[lanes, None]
+        distances = SHARES * top[lanes, None]
         again = lanes.repeat(len(SHARES))
-        looks = observe(trial, lines.only(again).at(t.ravel()))
-        open_ones = []
+        looks = observe(trial, lines.only(again).at(distances.ravel()))
+        without_stable = []
         for n, i in enumerate(lanes):
-            own = looks[n * len(SHARES) : (n + 1) * len(SHARES)]
-            stable_flags = [start_stable, *(observation.stable for observation in own)]
-            places = [0.0, *t[n]]
+            line_looks = looks[n * len(SHARES) : (n + 1) * len(SHARES)]
+            stable_flags = [start_stable, *(observation.stable for observation in line_looks)]
+            places = [0.0, *distances[n]]
             if not any(stable_flags):
-                open_ones.append(i)
-                top[i], stable[i] = t[n, 0], 0.0
+                without_stable.append(i)
+                top[i], stable[i] = distances[n, 0], 0.0
                 continue
+            # last place of the first unbroken run of stable ones
             first = stable_flags.index(True)
-            rest = stable_flags[first:]
-            last = first + (rest.index(False) if False in rest else len(rest)) - 1
+            onwards = stable_flags[first:]
+            last = first + (onwards.index(False) if False in onwards else len(onwards)) - 1
             stable[i] = places[last]
-            if last < len(own):
-                unstable[i], beyond[i], changed[i] = places[last + 1], own[last], True
-        lanes = np.array(open_ones, dtype=int)
+            if last < len(line_looks):
+                # places has the start in front, so that place last + 1 is observation `last`
+                unstable[i], beyond[i], changed[i] = places[last + 1], line_looks[last], True
+        lanes = np.array(without_stable, dtype=int)
     halved = bisect(trial, lines, Brackets(stable, np.where(changed, unstable, np.nan), beyond), tolerance)
     return Brackets(halved.stable, np.where(changed, halved.unstable, unstable), halved.observations)
 
 
 def stable_beyond(trial: StabilityTrial, lines: SearchLines, unstable: Floats) -> Flags:
-    """Whether a wall beyond the first unstable one (m,) is stable again; False where none is unstable."""
+    """Which lines (m,) are stable again at AFTER times the distance (m,) to the first unstable wall.
+
+    unstable  (m,)  that distance; nan, where no wall is unstable, gives False
+    """
     known = np.flatnonzero(np.isfinite(unstable))
     again = np.zeros(len(unstable), dtype=bool)
-    t = np.outer(unstable[known], AFTER)
-    looks = observe(trial, lines.only(known.repeat(len(AFTER))).at(t.ravel()))
-    again[known] = np.array([observation.stable for observation in looks], dtype=bool).reshape(t.shape).any(axis=1)
+    distances = np.outer(unstable[known], AFTER)
+    looks = observe(trial, lines.only(known.repeat(len(AFTER))).at(distances.ravel()))
+    again[known] = (
+        np.array([observation.stable for observation in looks], dtype=bool).reshape(distances.shape).any(axis=1)
+    )
     return again

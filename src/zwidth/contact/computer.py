@@ -105,14 +105,15 @@ class EstimateParameters(NamedTuple):
 
 def estimate_parameters(controller: Controller) -> EstimateParameters:
     """Velocity estimate of the computer, as numbers for the kernels."""
-    own = controller.velocity
-    if not isinstance(own, Foaw | Levant):
+    method = controller.velocity
+    if not isinstance(method, Foaw | Levant):
         estimator = velocity_estimator(controller)
         return EstimateParameters(LINEAR, np.zeros(1), len(estimator.window), estimator)
     factors = low_pass_factors(controller.velocity_filter, controller.sampling_period)
+    # numerators and denominators; no window
     rows = (np.array(part, dtype=np.float64).reshape(-1, 3) for part in factors)
     return EstimateParameters(
-        FOAW if isinstance(own, Foaw) else LEVANT, own.parameters, own.memory_size, Estimator(*rows)
+        FOAW if isinstance(method, Foaw) else LEVANT, method.parameters, method.memory_size, Estimator(*rows)
     )
 
 
@@ -142,11 +143,11 @@ def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Com
 
 
 def _stacked(arrays: Sequence[Floats]) -> Floats:
-    """Arrays of one rank side by side, padded with zeros to the largest."""
+    """Arrays of one rank along a new first axis, each padded with zeros to the largest size along every axis."""
     largest = np.max([array.shape for array in arrays], axis=0)
     stacked = np.zeros((len(arrays), *largest))
-    for room, array in zip(stacked, arrays, strict=True):
-        room[tuple(slice(size) for size in array.shape)] = array
+    for padded, array in zip(stacked, arrays, strict=True):
+        padded[tuple(slice(size) for size in array.shape)] = array
     return stacked
 
 
@@ -168,13 +169,13 @@ def computer_at(batch: Computers, d: int) -> Computer:
 
 @compiled
 def signals_of(computer: Computer, coordinates: int, commands: int) -> Signals:
-    """The memory of a computer that has just been switched on."""
+    """The memory of a computer that has just been switched on, for so many coordinates and commands."""
     return Signals(
-        np.zeros(coordinates),
-        np.zeros((coordinates, computer.memory)),
-        np.zeros((coordinates, computer.estimator.shape[0], 2)),
-        np.zeros((coordinates, computer.filter.shape[0], 2)),
-        np.zeros((commands, computer.delay + 2)),
+        first=np.zeros(coordinates),
+        past=np.zeros((coordinates, computer.memory)),
+        stages=np.zeros((coordinates, computer.estimator.shape[0], 2)),
+        filtered=np.zeros((coordinates, computer.filter.shape[0], 2)),
+        queue=np.zeros((commands, computer.delay + 2)),
     )
 
 
@@ -182,8 +183,10 @@ def signals_of(computer: Computer, coordinates: int, commands: int) -> Signals:
 def read_encoder(place: float, step: float, noise: float, seed: np.uint64, sample: int, channel: int) -> float:
     """Reading of an encoder at a position: with its noise, rounded to the nearest step, half a step upwards.
 
-    step     0: as fine as you like;   noise  standard deviation of what is added before rounding, in the same unit
-    channel  number of the encoder: each draws noise of its own
+    place, step  position and encoder step, in the encoder's unit; step 0: no rounding
+    noise        standard deviation of what is added before rounding, in the same unit
+    seed, sample  of the run's random numbers
+    channel      number of the encoder: each draws noise of its own
     """
     if noise > 0.0:
         place += noise * normal_number(seed, sample, channel)
@@ -200,9 +203,15 @@ def round_to_step(place: float, step: float) -> float:
 
 @compiled_inline
 def cascade(factors: Floats, states: Floats, signal: float) -> float:
-    """A signal through factors (k, 2, 3): (c2 d^2 + c1 d + c0)/(D2 d^2 + D1 d + D0), d = z - 1, monic below.
+    """A filter's next output for its next input: k factors in series, d = z - 1.
 
-    In observer form, whose states (k, 2) are zero at rest at zero:  y = c x + s1,  d s1 = s2 + ..,  d s2 = ..
+        (c2 d^2 + c1 d + c0)/(d^2 + d1 d + d0)     or, where the denominator's lead is 0,     (c1 d + c0)/(d + d0)
+
+    In observer form, whose states (k, 2) s1, s2 are zero at rest at zero, of input x and output y:
+
+        y = c2 x + s1,     d s1 = s2 + c1 x - d1 y,     d s2 = c0 x - d0 y
+
+    factors  (k, 2, 3)  rows numerator and denominator, falling powers of d;   states  are moved on by one sample
     """
     for k in range(factors.shape[0]):
         c2, c1, c0 = factors[k, 0, 0], factors[k, 0, 1], factors[k, 0, 2]
@@ -221,7 +230,10 @@ def cascade(factors: Floats, states: Floats, signal: float) -> float:
 
 @compiled_inline
 def weigh_readings(window: Floats, past: Floats, reading: float) -> float:
-    """The reading and those before it, weighed; past[0] is the reading before this one, and is moved on."""
+    """Weighted sum of the newest readings, this one first.
+
+    window  (w,)  weights;   past  the readings before, the newest first; is moved on to include this one
+    """
     total = float(window[0] * reading)
     for k in range(window.size - 1, 0, -1):
         total += window[k] * past[k - 1]
@@ -231,7 +243,10 @@ def weigh_readings(window: Floats, past: Floats, reading: float) -> float:
 
 @compiled_inline
 def estimate_velocity(computer: Computer, signals: Signals, s: int, reading: float, sample: int) -> float:
-    """The estimated velocity of coordinate s [m/s], which stood where it was first read before sample 0."""
+    """The estimated velocity of coordinate s [m/s] at a sample; before sample 0 it stood at its first reading.
+
+    reading  of the coordinate [m];   signals  the computer's memory, which is moved on
+    """
     if sample == 0:
         signals.first[s] = reading
     # counted from the first reading: a memory of zeros is then a device that has stood still before
@@ -276,21 +291,22 @@ def send_force(computer: Computer, signals: Signals, c: int, force: float) -> fl
 
 @compiled_inline
 def arrived_command(computer: Computer, signals: Signals, c: int, part: int) -> float:
-    """The command that motor c has in part 0 and 1 of an interval; in part 0 it is one sample older."""
+    """The command that acts on motor c before (part 0) or after (part 1) the newer one takes over."""
     return float(signals.queue[c, computer.delay + 1 - part])
 
 
 @compiled
-def scrambled(x: np.uint64) -> np.uint64:
+def scrambled(number: np.uint64) -> np.uint64:
     """SplitMix64's finaliser: neighbouring numbers go far apart (Steele, Lea and Flood 2014)."""
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
+    number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return number ^ (number >> np.uint64(31))
 
 
 @compiled
 def uniform(seed: np.uint64, sample: int, channel: int, draw: int) -> float:
     """Random number, uniform in (0, 1); the same for the same seed, sample, channel and draw."""
+    # odd constants spread seed, sample and channel over 64 bits; of the result 53 fill a float's digits
     key = scrambled(seed + np.uint64(0x9E3779B97F4A7C15))
     key = scrambled(key ^ (np.uint64(sample) * np.uint64(0x9E3779B97F4A7C15)))
     key = scrambled(key + np.uint64(2 * channel + draw + 1) * np.uint64(0xD1B54A32D192ED03))
@@ -329,7 +345,7 @@ class PlantArrays(NamedTuple):
     loss, work  (D, P, M, M)    quadratic forms of the ledger, M = N + F; size 0 without one
     energy      (D, N, N)
     size        (D,)            coordinates n: velocities stand n places after them
-    kind        (D, E)          of each element;   numbers (D, E, 6)
+    kind        (D, E)          of each element;   numbers (D, E, 6)  its parameters, as `plant_step.element_force`
     along       (D, E, n)       motion each works on
     reading     (D, E, n)       what the computer reads for a sampled force
     sensor      (D, n)          what is read, as it is

@@ -58,7 +58,7 @@ class PassivityComparison(NamedTuple):
 def is_pushed_on(loop: Loop, touched: Environment, values: Floats, hand: Hand) -> bool:
     """Whether the hand's push moves the device on and on, since no stiffness of the wall holds a position.
 
-    loop  held by its operator
+    loop  held by its operator;   touched, values  the environment and its parameters (P,)
     """
     if touched.name not in WALLS or values[0] != 0.0 or hand.push == 0.0 or hand.tremor is not None:
         return False
@@ -110,6 +110,7 @@ class ContactSimulation(Result):
             return "growing"
         if tremor is None or judged.behaviour not in ("limit cycle", "undecided"):
             return judged.behaviour
+        # resolution of a frequency, which is determined in the second half of the run
         tolerance = 1.0 / (0.5 * len(self.response.time) * self.loop.period)
         return "forced" if abs(judged.frequency - tremor.frequency) < tolerance else judged.behaviour
 
@@ -194,7 +195,7 @@ class ContactSimulation(Result):
 
     @property
     def time(self) -> Floats:
-        """(S,) [s]"""
+        """Times of the samples (S,) [s]."""
         return self.response.time
 
     @property
@@ -401,7 +402,7 @@ def run_length(
 ) -> RunLength:
     """Choose the length of a run [s].
 
-    growth      predicted, ln rho per sample; None: not known
+    growth      predicted, ln rho per sample, rho its factor per sample; None: not known
     period      T [s]
     linear      True: the motion is a sum of exponentials
     busy_until  end of the hand's last movement [s]
@@ -414,9 +415,9 @@ def run_length(
         samples = max(tenfold, fast, NEEDED)
         reason = "a tenfold change at the predicted rate" if tenfold >= max(fast, NEEDED) else "it changes fast"
         most = GROWN * tenfold if growth and growth > 0.0 else inf
-        for own, why in ((_periods(frequency) / period, f"{PERIODS} periods"), (sound / period, "to be heard")):
-            if min(own, most) > samples:
-                samples, reason = min(own, most), why
+        for wanted, why in ((_periods(frequency) / period, f"{PERIODS} periods"), (sound / period, "to be heard")):
+            if min(wanted, most) > samples:
+                samples, reason = min(wanted, most), why
         seconds = ceil(min(samples, 1e18)) * period
         return _capped(seconds + busy_until, f"{reason}, once the hand is done" if busy_until else reason, period)
     least = max(LEAST + busy_until, 2 * FEWEST * period)
@@ -432,23 +433,23 @@ def run_length(
 
 
 def lengthened(length: RunLength, sound: float, period: float) -> RunLength:
-    """The length, or a longer one where a first run shows that its sound needs more seconds."""
+    """The length, or `sound` seconds where a run's sound, known after a first run, needs more."""
     return length if sound <= length.seconds else _capped(sound, "to be heard", period)
 
 
 def _periods(frequency: float) -> float:
-    """Seconds that so many periods take; 0 where there is no frequency."""
+    """Seconds that PERIODS periods of a frequency [Hz] take; 0 for a frequency of 0."""
     return PERIODS / frequency if frequency > 0.0 else 0.0
 
 
 def _capped(seconds: float, reason: str, period: float) -> RunLength:
-    """Length of a run of so many seconds, or the longest that is allowed, with its reason."""
+    """Length of a run with its reason, at most MOST seconds and MOST_SAMPLES samples of this period [s]."""
     most = min(MOST, MOST_SAMPLES * period)
     return RunLength(seconds, reason) if seconds <= most else RunLength(most, f"{reason}, at most this")
 
 
 def busy_until(hand: Hand) -> float:
-    """End of the hand's last movement [s]."""
+    """End of the hand's last movement [s], of a tremor that of its first SWINGS swings."""
     reached = 0.0 if hand.reach is None else hand.reach.start + hand.reach.duration
     slow = hand.tremor is not None and hand.tremor.frequency > 0.0
     trembled = SWINGS / hand.tremor.frequency if slow and hand.tremor is not None else 0.0
@@ -462,6 +463,7 @@ def bound_of_run(offset: float, growth: float | None) -> float:
     Returns more than that where the run starts so far away, or grows so far in the samples in which its growth is
             measured
     """
+    # no exponent above 600, which would overflow
     grown = offset * exp(min(max(growth or 0.0, 0.0) * JUDGED, 600.0))
     return max(LARGEST_MOTION, 10.0 * offset, min(grown, FARTHEST))
 

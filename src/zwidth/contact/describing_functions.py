@@ -20,14 +20,14 @@ from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
 
 
-def _positive(**values: ArrayLike) -> None:
-    """Raise ValueError where a value is not positive; inf passes."""
+def _check_positive(**values: ArrayLike) -> None:
+    """Raise ValueError, with its name, for the first value (...) that is not positive throughout; inf passes."""
     for name, value in values.items():
         if not np.all(np.asarray(value, dtype=float) > 0.0):
             raise ValueError(f"{name.replace('_', ' ')} must be positive, got {value!r}")
 
 
-def _each(gain: Callable[..., float], *values: ArrayLike) -> Floats:
+def _elementwise(gain: Callable[..., float], *values: ArrayLike) -> Floats:
     """Gains (...) of values (...), which are broadcast, by a compiled function of single numbers."""
     return np.asarray(np.vectorize(gain, otypes=[float])(*(np.asarray(value, dtype=float) for value in values)))
 
@@ -53,11 +53,11 @@ def quantiser(amplitude: ArrayLike, step: ArrayLike, offset: ArrayLike = 0.0) ->
     ([0.0, 1.2732, 1.0001], 6.3662)
     """
     A, step, c = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in (amplitude, step, offset)))
-    _positive(amplitude=A)
+    _check_positive(amplitude=A)
     if not np.all(step >= 0.0):
         raise ValueError(f"step must not be negative, got {np.min(step)!r}")
     unit = np.where(step > 0.0, step, 1.0)
-    return np.where(step > 0.0, _each(quantiser_gain, A / unit, c / unit), 1.0)
+    return np.where(step > 0.0, _elementwise(quantiser_gain, A / unit, c / unit), 1.0)
 
 
 # From here on the gain is 1 to 1e-6 (it swings about 1 like a^-3/2), and its sum longer than it is worth.
@@ -66,13 +66,13 @@ MANY_STEPS: Final = 1e4
 
 @compiled_lean
 def quantiser_gain(a: float, c: float) -> float:
-    """The gain of a quantiser with step 1, for an amplitude `a` about `c`."""
+    """N of `quantiser` for one amplitude `a` about the middle `c`, both in steps."""
     if a > MANY_STEPS:
         return 1.0
-    c -= np.floor(c + 0.5)
+    c -= np.floor(c + 0.5)  # whole steps do not matter
     total = 0.0
     for k in range(int(np.floor(c - a)), int(np.ceil(c + a)) + 1):
-        share = (k + 0.5 - c) / a
+        share = (k + 0.5 - c) / a  # sin theta at threshold k; beyond 1 the sine does not reach it
         total += np.sqrt(max(1.0 - share * share, 0.0))
     return float(2.0 / (np.pi * a) * total)
 
@@ -102,8 +102,8 @@ def saturation(amplitude: ArrayLike, limit: ArrayLike) -> Floats:
     >>> saturation([1.0, 2.0, 100.0], 1.0).round(4).tolist()
     [1.0, 0.609, 0.0127]
     """
-    _positive(amplitude=amplitude, limit=limit)
-    return _each(saturation_gain, amplitude, limit)
+    _check_positive(amplitude=amplitude, limit=limit)
+    return _elementwise(saturation_gain, amplitude, limit)
 
 
 @compiled_lean
@@ -125,7 +125,7 @@ def bent_spring_gain(amplitude: float, cubic: float, backward_excess: float, kin
                      left out
     kink             not positive [m]
     """
-    share = 0.5
+    share = 0.5  # of the excess: a kink at 0 stiffens half of the sine
     if kink < 0.0:
         c = min(-kink / amplitude, 1.0)
         share = (np.arccos(c) - c * np.sqrt(1.0 - c * c)) / np.pi

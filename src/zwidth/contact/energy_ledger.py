@@ -14,6 +14,8 @@ each step of the way is charged with the difference it makes:
 
 Hand, friction, brakes and bent springs hold their force over a substep, so that their work is force times motion;
 what structural dampers take out is a quadratic form of the states. All of them sum up to what the plant stores.
+
+In all kernels d is the index of a device, part that of a part of an interval; see `computer.PlantArrays`.
 """
 
 from __future__ import annotations
@@ -41,7 +43,7 @@ from zwidth.contact.computer import (
     PlantArrays,
 )
 from zwidth.contact.hand import BRAKE
-from zwidth.contact.plant_step import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING
+from zwidth.contact.plant_step import BRISTLES, COULOMB, NOTHING, ROLE, SAMPLED, SPRING
 
 (
     LAST_TRUTH,
@@ -55,8 +57,12 @@ from zwidth.contact.plant_step import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRIN
 
 
 class Ledger(NamedTuple):
-    """entries (12,) or none: the ledger [J];   last (7,)  what the previous sample left, LAST_TRUTH to BEGUN;
-    work (M,)  memory of `enter_substep`"""
+    """The energy ledger of a run.
+
+    entries  (12,) or (0,)  HAND to STORED of `computer` [J]; none where no ledger is wanted
+    last     (7,)           what the previous sample left, LAST_TRUTH to BEGUN
+    work     (M,)           working memory of `enter_substep`
+    """
 
     entries: Floats
     last: Floats
@@ -71,7 +77,7 @@ def new_ledger(devices: PlantArrays, wanted: bool) -> Ledger:
 
 @compiled_lean
 def energy_of(devices: PlantArrays, d: int, states: Floats) -> float:
-    """Kinetic and elastic energy of the linear plant [J]."""
+    """Kinetic and elastic energy of the linear plant of device d [J] in these states (N,) or (R,)."""
     total = 0.0
     for i in range(devices.energy.shape[1]):
         for k in range(devices.energy.shape[1]):
@@ -80,7 +86,7 @@ def energy_of(devices: PlantArrays, d: int, states: Floats) -> float:
 
 
 @compiled_lean
-def form(matrices: Floats, d: int, part: int, x: Floats) -> float:
+def quadratic_form(matrices: Floats, d: int, part: int, x: Floats) -> float:
     """Quadratic form x . matrices[d, part] x of a vector x (n,)."""
     total = 0.0
     for i in range(x.size):
@@ -101,24 +107,27 @@ def enter_substep(
     forces: Floats,
     book: Ledger,
 ) -> None:
-    """Enter the work [J] done over one substep, between states (R,) before and after, under these forces [N]."""
-    N, n, X = devices.energy.shape[1], devices.size[d], book.work
+    """Enter the work [J] done over one substep, between states (R,) before and after.
+
+    command, push  held forces of actuator and hand [N];   forces (E,)  of the elements
+    """
+    N, n, held = devices.energy.shape[1], devices.size[d], book.work
     for i in range(N):
-        X[i] = before[i]
+        held[i] = before[i]
     # states, held forces and elements' forces: the losses of a linear substep are a quadratic form of them all
-    X[N], X[N + 1] = command, push
+    held[N], held[N + 1] = command, push
     for e in range(forces.size):
-        X[N + 2 + e] = forces[e]
+        held[N + 2 + e] = forces[e]
     entries = book.entries
-    entries[STRUCTURE] -= form(devices.loss, d, part, X)
-    book.last[ACTUATOR_WORK] += form(devices.work, d, part, X)
+    entries[STRUCTURE] -= quadratic_form(devices.loss, d, part, held)
+    book.last[ACTUATOR_WORK] += quadratic_form(devices.work, d, part, held)
     for k in range(n):
         entries[HAND] += push * devices.push[d, k] * (after[k] - before[k])
     for e in range(forces.size):
         kind = devices.kind[d, e]
         if kind == NOTHING:
             continue
-        # the force is constant over the substep, so that its work is exact
+        # the force is constant over the substep, so that its work is exact; state N + 2 e is the motion's place
         work = forces[e] * (after[N + 2 * e] - before[N + 2 * e])
         if kind in (COULOMB, BRISTLES):
             entries[FRICTION] += work
@@ -126,7 +135,7 @@ def enter_substep(
             entries[SPRINGS] += work
         elif kind == SAMPLED:
             entries[ACTUATOR] += work
-        elif devices.numbers[d, e, 0] == BRAKE:
+        elif devices.numbers[d, e, ROLE] == BRAKE:
             entries[BRAKES] += work
         else:
             entries[HAND] += work
@@ -142,7 +151,14 @@ def enter_sample(
     controlled_force: float,
     stored: float,
 ) -> None:
-    """At a sample: charge the interval that ends, and keep what the next one starts with."""
+    """At a sample: charge the interval that ends, and keep what the next one starts with.
+
+    truth             place of the reading's motion, without steps and noise [m]
+    ideal_force       environment's answer to true place and velocity [N];   unquantised_force  to true place and
+                      estimated velocity;   environment_force  to the readings
+    controlled_force  with the passivity controller's part [N]
+    stored            energy that the plant has stored since the start [J]
+    """
     entries, last = book.entries, book.last
     if last[BEGUN] > 0.0:
         dy = truth - last[LAST_TRUTH]

@@ -5,6 +5,9 @@ filtered, limited and queued; then the plant goes through the two parts of the i
 command of one sample more of delay. Linear parts are exact with any substep. A nonlinear part acts as its mean
 force over a substep, determined by the motion in that substep; the error is of second order in its length (see
 `plant_step`).
+
+In all kernels m is the index of a run, d that of its device, part that of a part of an interval, e that of an
+element; `computer.PlantArrays` and `RunArrays` say what their arrays hold.
 """
 
 from __future__ import annotations
@@ -40,6 +43,9 @@ from zwidth.contact.computer import (
 from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_substep, new_ledger
 from zwidth.contact.environments import MEMORY, environment_at
 from zwidth.contact.fixed_feedback import (
+    ACTING_COMMAND,
+    LOCAL_DELAY,
+    LOCAL_LOOP,
     FeedbackArrays,
     FeedbackMemory,
     feedback_memory,
@@ -47,10 +53,22 @@ from zwidth.contact.fixed_feedback import (
     sample_local_loop,
     with_feedback,
 )
-from zwidth.contact.hand import hand_force, sample_brakes_and_reflexes, step_brakes_and_reflexes
+from zwidth.contact.hand import (
+    PUSH,
+    RAMP,
+    REACH_DURATION,
+    TREMOR_AMPLITUDE,
+    hand_force,
+    sample_brakes_and_reflexes,
+    step_brakes_and_reflexes,
+)
 from zwidth.contact.passivity_controller import PASSIVITY_MEMORY as PASSIVITY
 from zwidth.contact.passivity_controller import passivity_force
 from zwidth.contact.plant_step import (
+    ACTUATOR_LAG,
+    END_FORCE,
+    FILTERED,
+    MEAN_FORCE,
     SAMPLED,
     VARYING,
     PlantState,
@@ -74,7 +92,8 @@ ENCODERS = 64  # numbers of encoders by which two samples of a local loop draw n
 def draw_noise(devices: PlantArrays, d: int, seed: np.uint64, sample: int, fast: int, drawn: Floats) -> None:
     """Noise of each encoder at a sample, into drawn (C,).
 
-    fast  number of the local loop's sample within the period: each has noise of its own
+    seed    of the run;   sample  number of the sample
+    fast    number of the local loop's sample within the period: each has noise of its own
     """
     for c in range(drawn.size):
         noise = devices.noise[d, c]
@@ -99,11 +118,16 @@ def advance_substeps(
     first: int,
     book: Ledger,
 ) -> None:
-    """Substeps from begin to end of one part of an interval, which begins at `time`."""
+    """Substeps begin to end - 1 of one part of an interval, for run m of device d.
+
+    time     begin of the part [s];   command  that acts in it [N];   state  is moved on
+    trail    (m, .)  handle's place after each substep [m], from column `first` on for this part; size 0: not kept
+    book     energy ledger; without entries where none is wanted
+    """
     A, inputs, h, n = devices.transition, devices.inputs, devices.length[d, part], devices.size[d]
     hand, E, kept, booked = members.push, devices.kind.shape[1], trail.shape[1] > 0, book.entries.size > 0
-    steady = hand[m, 1] == 0.0 and hand[m, 5] == 0.0 and hand[m, 6] == 0.0
-    push, here = hand[m, 0], state
+    steady = hand[m, RAMP] == 0.0 and hand[m, REACH_DURATION] == 0.0 and hand[m, TREMOR_AMPLITUDE] == 0.0
+    push, here = hand[m, PUSH], state
     # dry friction or none under a constant push, nothing recorded: the commonest case, in a loop of its own
     if steady and not (kept or booked) and only_coulomb(devices, d):
         step_with_frictions(devices, d, part, end - begin, command, push, state)
@@ -116,7 +140,7 @@ def advance_substeps(
             set_held_increment(inputs, d, part, command, push, here.held_increment)
         if E:
             predict_motions(A, d, part, here)
-            solve_forces(devices, d, part, False, here)
+            solve_forces(devices, d, part, False, here)  # elements of any kinds
         step(A, inputs, d, part, here)
         if booked:
             enter_substep(devices, d, part, here.states, here.next_states, command, push, here.forces, book)
@@ -129,13 +153,16 @@ def advance_substeps(
 
 @compiled_inline
 def sample_forces(devices: PlantArrays, d: int, computer: Computer, added: Signals, states: Floats) -> None:
-    """At a sample: the commands of the forces that the computer adds under load, on their way from now on."""
+    """At a sample: queue the commands of the forces that the computer adds beside the wall's, one per element.
+
+    added   queues and filters, one per element;   states (R,)  of the plant
+    """
     for e in range(devices.kind.shape[1]):
         if devices.kind[d, e] == SAMPLED:
             signal = 0.0
             for k in range(devices.size[d]):
                 signal += devices.reading[d, e, k] * states[k]
-            if devices.numbers[d, e, 0] != 0.0:
+            if devices.numbers[d, e, FILTERED] != 0.0:
                 signal = filter_force(computer, added, e, signal)
             send(added, e, signal)
 
@@ -144,14 +171,19 @@ def sample_forces(devices: PlantArrays, d: int, computer: Computer, added: Signa
 def step_sampled_forces(
     devices: PlantArrays, d: int, computer: Computer, added: Signals, new: int, h: float, memory: Floats
 ) -> None:
-    """Over a substep: what those that have arrived are worth on the average, behind the actuator's lag; into
-    memory (E, 4): the mean, and the force at the substep's end."""
+    """Over a substep of length h [s]: forces behind the actuator's lag of the sampled forces that have arrived.
+
+    new     1 once the new command acts, 0 before
+    memory  (E, 4)  gets MEAN_FORCE over the substep and END_FORCE at its end [N]
+    """
     for e in range(devices.kind.shape[1]):
         if devices.kind[d, e] == SAMPLED:
-            wanted, lag, now = arrived_command(computer, added, e, new), devices.numbers[d, e, 1], memory[e, 1]
+            wanted, lag = arrived_command(computer, added, e, new), devices.numbers[d, e, ACTUATOR_LAG]
+            now = memory[e, END_FORCE]
             fade = np.exp(-h / lag) if lag > 0.0 else 0.0
-            memory[e, 0] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
-            memory[e, 1] = wanted + (now - wanted) * fade
+            # the mean of the exponential approach to what is wanted
+            memory[e, MEAN_FORCE] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
+            memory[e, END_FORCE] = wanted + (now - wanted) * fade
 
 
 @compiled_inline
@@ -173,9 +205,17 @@ def advance_interval(
     varies: bool,
 ) -> None:
     """From sample j to the next: first with the command of one sample more of delay, then with the new one. The
-    local loop takes its samples in between."""
+    local loop takes its samples in between.
+
+    time     of the sample [s]
+    signals, added  memory of the computer, and of the forces that it adds beside the wall's
+    feedback, memory  the fixed feedback, and what it remembers;   drawn (C,)  room for the encoders' noise
+    varies   whether an element changes from substep to substep (VARYING or SAMPLED)
+    """
     d, trail, period = members.device[m], records.handle, computer.period
-    has_local, fast, fast_part = feedback.acts[d, 2] != 0, 0, 0
+    # fast: samples of the local loop taken; fast_part: 0 once its new command acts, 1 until then
+    has_local, fast, fast_part = feedback.acts[d, LOCAL_LOOP] != 0, 0, 0
+    # first: column of the trail at which a part begins
     begun, first = time, 0
     for part in range(devices.substeps.shape[1]):
         first += devices.substeps[d, part]
@@ -194,9 +234,11 @@ def advance_interval(
                 fast, fast_part = fast + 1, 1
             elif devices.local[d, part] == LATER:
                 fast_part = 0
-            command += memory.queue[feedback.delays[d, 1] + (fast_part if feedback.splits[d] != 0 else 0)]
+            command += memory.queue[
+                feedback.delays[d, LOCAL_DELAY] + (fast_part if feedback.splits[d] != 0 else 0)
+            ]
             command = clip(command, computer.limit)
-        memory.first[2] = command
+        memory.first[ACTING_COMMAND] = command
         # forces that vary are renewed at each substep; where none does, all substeps are taken in one go
         stride = 1 if varies else max(count, 1)
         for k in range(0, count, stride):
@@ -220,26 +262,30 @@ def run_member(
     address: int,
     records: Records,
 ) -> None:
-    """One run: everything from the first sample to the last, or until the reading has left its bounds.
+    """Run m: everything from the first sample to the last, or until the reading has left its bounds.
+
+    samples  to be run;   address  of the environment's machine code;   records  are filled in
 
     For the ledger a second computer reads without steps and noise, and the environment answers once more, to the
     velocity as it is.
     """
     force, d = environment_at(address), members.device[m]
-    computer, own = computer_at(computers, d), motion_from(devices, members.start[m])
+    computer, plant = computer_at(computers, d), motion_from(devices, members.start[m])
     T, n, wall, values = computer.period, devices.size[d], members.wall[m], members.values[m]
-    signals, exact = signals_of(computer, 1, 1), signals_of(computer, 1, 1)
+    # memory of the computer, and of a second one that reads without steps and noise
+    signals, exact_signals = signals_of(computer, 1, 1), signals_of(computer, 1, 1)
+    # what the environment remembers: of the readings, of true places with estimated velocities, of the true motion
     memory, sampled_memory, law_memory = np.zeros(MEMORY), np.zeros(MEMORY), np.zeros(MEMORY)
-    states, watch, observer = own.states, members.observer[m], np.zeros(PASSIVITY)
+    states, passivity, passivity_memory = plant.states, members.observer[m], np.zeros(PASSIVITY)
     reflex, traces, drawn = members.reflex[m], records.traces, np.zeros(devices.step.shape[1])
-    watched, booked = not np.isnan(watch[0]), records.ledger.shape[1] > 0
-    kept, controls, varies = feedback_memory(feedback, d), False, False
+    has_passivity, booked = not np.isnan(passivity[0]), records.ledger.shape[1] > 0
+    feedback_state, has_feedback, varies = feedback_memory(feedback, d), False, False
     for part in range(3):
-        controls = controls or feedback.acts[d, part] != 0
+        has_feedback = has_feedback or feedback.acts[d, part] != 0
     for element in range(devices.kind.shape[1]):
         varies = varies or devices.kind[d, element] in (VARYING, SAMPLED)
     added = signals_of(computer, devices.kind.shape[1], devices.kind.shape[1])
-    book, started = new_ledger(devices, booked), energy_of(devices, d, states)
+    book, stored_at_start = new_ledger(devices, booked), energy_of(devices, d, states)
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
         # the order of one period: read, estimate, render, filter, limit, send
@@ -248,13 +294,15 @@ def run_member(
         speed = estimate_velocity(computer, signals, 0, counted, j)
         environment_force = force(counted - wall, speed, time, T, values, memory)
         controlled_force = (
-            passivity_force(observer, watch, environment_force, counted, T) if watched else environment_force
+            passivity_force(passivity_memory, passivity, environment_force, counted, T)
+            if has_passivity
+            else environment_force
         )
         if booked:
             # what would be rendered without encoder steps, and with the true velocity: the differences are their
             # energies
-            smooth = estimate_velocity(computer, exact, 0, truth, j)
-            unquantised_force = force(truth - wall, smooth, time, T, values, sampled_memory)
+            smooth_speed = estimate_velocity(computer, exact_signals, 0, truth, j)
+            unquantised_force = force(truth - wall, smooth_speed, time, T, values, sampled_memory)
             true_speed = dot(devices.sensor, d, states, n, n)
             ideal_force = force(truth - wall, true_speed, time, T, values, law_memory)
             enter_sample(
@@ -264,15 +312,15 @@ def run_member(
                 unquantised_force,
                 environment_force,
                 controlled_force,
-                energy_of(devices, d, states) - started,
+                energy_of(devices, d, states) - stored_at_start,
             )
             for entry in range(book.entries.size):
                 records.ledger[m, j, entry] = book.entries[entry]
         total_force = controlled_force
-        if controls:
+        if has_feedback:
             push = hand_force(members.push, m, time)
-            measured = read_force(feedback, d, states, kept.first[2], push, own.forces)
-            total_force = with_feedback(feedback, d, kept, controlled_force, counted, measured, j, T)
+            measured = read_force(feedback, d, states, feedback_state.first[ACTING_COMMAND], push, plant.forces)
+            total_force = with_feedback(feedback, d, feedback_state, controlled_force, counted, measured, j, T)
         command = send_force(computer, signals, 0, total_force)
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed
         traces[m, j, FORCE], traces[m, j, HANDLE] = command, dot(devices.handle, d, states, 0, n)
@@ -282,7 +330,7 @@ def run_member(
             break
         if varies:
             sample_forces(devices, d, computer, added, states)
-            sample_brakes_and_reflexes(devices, d, reflex, time, T, controlled_force, states, own.memory)
+            sample_brakes_and_reflexes(devices, d, reflex, time, T, controlled_force, states, plant.memory)
         advance_interval(
             devices,
             members,
@@ -290,11 +338,11 @@ def run_member(
             time,
             j,
             records,
-            own,
+            plant,
             computer,
             signals,
             feedback,
-            kept,
+            feedback_state,
             added,
             drawn,
             book,
@@ -314,6 +362,6 @@ def run_several(
     first: int,
     last: int,
 ) -> None:
-    """Runs first to last - 1: samples (m,), and where the environment's machine code is."""
+    """Runs first to last - 1, of `samples` (m,) each; address  of the environment's machine code."""
     for m in range(first, last):
         run_member(devices, computers, feedback, members, m, samples[m], address, records)

@@ -31,6 +31,7 @@ from zwidth.model.modes import least_deforming_motion, undamped_modes
 from zwidth.model.operator import attach
 from zwidth.model.plant import Counter, Plant, Spring
 
+# kind, numbers and motion (n,) of an element, see `plant_step.element_force`
 Element = tuple[int, tuple[float, ...], Floats]
 
 
@@ -54,7 +55,7 @@ class HeldDevice:
         self.push = self.handle
         if operator is not None and not operator.rigid_grasp:
             self.push = self.shapes[-1]
-        self.elements = _own_elements(self.modal_plant)
+        self.elements = _passive_elements(self.modal_plant)
         if hand.reflex is not None and operator is not None:
             self.elements.append((VARYING, (ARM,), self.push))
             if not operator.rigid_grasp:
@@ -65,6 +66,7 @@ class HeldDevice:
 
     def modal(self, coordinates: Floats) -> Floats:
         """Coordinates, or velocities, of the given plant as those of its modes."""
+        # the modes have mass 1, so that shapes^T M is the inverse of `shapes`
         return np.asarray(self.shapes.T @ (self.attached_plant.mass @ coordinates))
 
     @cached_property
@@ -86,6 +88,8 @@ class HeldDevice:
 def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
     """The plant in the coordinates of its undamped modes: mass 1, stiffness w^2 on the diagonal.
 
+    squared, shapes  w^2 (n,) [1/s^2] and modes (n, n) as columns, as by `undamped_modes`
+
     A motion without stiffness then has none. In other coordinates rounding would leave it a little of the stiffest
     spring, which a minute of free motion turns into digits.
     """
@@ -94,17 +98,17 @@ def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
     return replace(moved, mass=np.eye(plant.size), stiffness=np.diag(squared), lagged_dampers=active)
 
 
-def _own_elements(plant: Plant) -> list[Element]:
+def _passive_elements(plant: Plant) -> list[Element]:
     """Kind, numbers and motion (n,) of each friction, spring and brake of a plant; idle frictions are left out."""
-    own, elements = plant.nonlinear, list[Element]()
-    for dry in own.friction:
-        bent = dry.bristles
-        if bent is not None and max(bent[:2]) > 0.0:
-            elements.append((BRISTLES, bent, dry.along))
-        elif bent is None and dry.coulomb > 0.0:
+    parts, elements = plant.nonlinear, list[Element]()
+    for dry in parts.friction:
+        bristles = dry.bristles
+        if bristles is not None and max(bristles[:2]) > 0.0:  # a level, in motion or at rest
+            elements.append((BRISTLES, bristles, dry.along))
+        elif bristles is None and dry.coulomb > 0.0:
             elements.append((COULOMB, (dry.coulomb,), dry.along))
-    elements += [(SPRING, _spring_numbers(spring), spring.along) for spring in own.springs]
-    elements += [(VARYING, (BRAKE, brake.damping, brake.time_constant), brake.along) for brake in own.brakes]
+    elements += [(SPRING, _spring_numbers(spring), spring.along) for spring in parts.springs]
+    elements += [(VARYING, (BRAKE, brake.damping, brake.time_constant), brake.along) for brake in parts.brakes]
     return elements
 
 
@@ -117,16 +121,20 @@ def _spring_numbers(spring: Spring) -> tuple[float, ...]:
 
 
 def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArrays:
-    """The plants between samples; a part of an interval has at least one substep where it has any length."""
+    """The plants between samples, as arrays for the engine.
+
+    substeps  of an interval; a part of it has at least one where it has any length
+    """
+    # sizes: D devices, E elements, C encoders, n coordinates, P parts, N states, F forces, R rows
     D, E = len(held_devices), max(len(held_device.elements) for held_device in held_devices)
     C, n = (
         max(len(held_device.counters) for held_device in held_devices),
         max(held_device.modal_plant.size for held_device in held_devices),
     )
-    own = [_dynamics(held_device) for held_device in held_devices]
+    linear = [_dynamics(held_device) for held_device in held_devices]
     parts = [interval_parts(held_device.loop, substeps) for held_device in held_devices]
     P = max(len(each) for each in parts)
-    N = max(len(arrays.generator) for arrays in own)
+    N = max(len(moving.generator) for moving in linear)
     F, R = 2 + E, N + 2 * E
     arrays = PlantArrays(
         transition=np.zeros((D, P, R, N)),
@@ -152,7 +160,7 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
         noise=np.zeros((D, C)),
         encoder=np.zeros((D, C), dtype=np.int64),
     )
-    for d, (held_device, moving) in enumerate(zip(held_devices, own, strict=True)):
+    for d, (held_device, moving) in enumerate(zip(held_devices, linear, strict=True)):
         m = len(moving.generator)
         arrays.energy[d, :m, :m] = moving.energy
         _fill_motions(arrays, d, held_device)
@@ -178,15 +186,17 @@ class IntervalPart(NamedTuple):
 
 
 def interval_parts(loop: Loop, substeps: int) -> list[IntervalPart]:
-    """The parts of an interval: before and after the new command acts, with a local loop also between its samples.
+    """The parts of an interval: before and after the new command acts, each divided where a local loop samples and
+    where its command begins to act.
 
     substeps  of the interval; a part has at least one
     """
-    f, local = loop.fractional_delay, loop.controller.local_loop
+    f, local = loop.fractional_delay, loop.controller.local_loop  # f: share of the interval until the command acts
     if local is None or not acts(local):
         early = min(max(1, round(f * substeps)), max(substeps - 1, 1)) if f > 0.0 else 0
         parts = [IntervalPart(f, early, False, NOTHING_LOCAL)] if early else []
         return [*parts, IntervalPart(1.0 - f, max(substeps - early, 1), True, NOTHING_LOCAL)]
+    # a fast sample is 1/N of the interval, and the local loop's new command acts after the share `waits` of it
     N, waits = local.rate_multiple, split_delay(local.delay)[1]
     changes = {k / N: SAMPLE for k in range(N)}
     if waits > 0.0:
@@ -212,6 +222,7 @@ def reading_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Flo
             continue
         moving, plant = _dynamics(held_device), held_device.modal_plant
         n, m = plant.size, len(moving.generator)
+        # the sensor's force depends on accelerations; these follow from states and forces by the plant's rows
         by_acceleration, by_velocity, by_place = measured_force(plant, sensor)
         row[:m] = by_acceleration @ moving.generator[n : 2 * n]
         row[:n] += by_place
@@ -256,8 +267,12 @@ def _fill_motions(arrays: PlantArrays, d: int, held_device: HeldDevice) -> None:
 
 
 def _fill_part(arrays: PlantArrays, d: int, part: int, step: Substep) -> None:
-    """Matrices of a substep of one part; the ledger's forms take the states first, then the forces, padded."""
+    """Fill in the matrices of a substep of one part of device d's interval.
+
+    The ledger's forms take the m states first, padded to N, then the F forces.
+    """
     m, F = step.inputs.shape
+    # rows N to last of transition and inputs: place and speed of the F - 2 elements' motions
     N = arrays.transition.shape[-1]
     at, last = np.concatenate([np.arange(m), np.arange(N, N + F)]), N + 2 * (F - 2)
     arrays.transition[d, part, :m, :m] = step.transition
@@ -279,7 +294,7 @@ def start_states(held_device: HeldDevice, arrays: PlantArrays, d: int, x: Floats
 
 
 def motions_of(arrays: PlantArrays, d: int, m: int) -> Floats:
-    """Rows (2 E, m) that read place and speed of each element's motion from m states."""
+    """Rows (2 E, m) that read place and speed, by turns, of each element's motion from m states of device d."""
     E, n = arrays.kind.shape[1], int(arrays.size[d])
     rows = np.zeros((E, 2, m))
     rows[:, 0, :n] = rows[:, 1, n : 2 * n] = arrays.along[d, :, :n]
@@ -318,6 +333,7 @@ def dynamics(plant: Plant, lag: float, motions: Floats) -> LinearDynamics:
     N = 2 * n + len(dampers) + (lag > 0.0)
     x, v = slice(0, n), slice(n, 2 * n)
     solved = np.linalg.solve(plant.mass, np.column_stack([plant.stiffness, plant.damping, plant.actuator]))
+    # columns of `solved`: M^-1 K, M^-1 B, M^-1 a
     A, inputs = np.zeros((N, N)), np.zeros((N, 1 + len(motions)))
     energy, loss = np.zeros((N, N)), np.zeros((N, N))
     drive, force = np.zeros(N), np.zeros(N)
@@ -328,7 +344,7 @@ def dynamics(plant: Plant, lag: float, motions: Floats) -> LinearDynamics:
         A[v, x] -= np.linalg.solve(plant.mass, plant.circulatory)
         loss[v, x], loss[x, v] = 0.5 * plant.circulatory, 0.5 * plant.circulatory.T
     for i, damper in enumerate(dampers):
-        at = 2 * n + i
+        at = 2 * n + i  # its force f:  tau f' + f = b v
         A[v, at] = -np.linalg.solve(plant.mass, damper.along)
         A[at, v] = damper.damping / damper.time_constant * damper.along
         A[at, at] = -1.0 / damper.time_constant
@@ -373,21 +389,23 @@ def substep(dynamics: LinearDynamics, h: float) -> Substep:
     scale[dynamics.size : N] = np.where(held > 0.0, (h if h > 0.0 else 1.0) * np.sqrt(held), 1.0)
     augmented = np.zeros((M, M))
     augmented[:N, :N], augmented[:N, N:] = dynamics.generator * h, dynamics.inputs * h
-    E = expm(augmented * scale[:, None] / scale) / scale[:, None] * scale
+    exponential = expm(augmented * scale[:, None] / scale) / scale[:, None] * scale
     loss, work = np.zeros((M, M)), np.zeros((M, M))
     loss[:N, :N] = dynamics.loss
+    # the actuator's power is (force . X)(drive . X), symmetric as a form
     force = np.concatenate([dynamics.force, np.eye(1, F)[0] * (not dynamics.force.any())])
     drive = np.concatenate([dynamics.drive, np.zeros(F)])
     work[:] = 0.5 * (np.outer(force, drive) + np.outer(drive, force))
     forms = [
-        _gathered(augmented * scale[:, None] / scale, form * h / scale[:, None] / scale) for form in (loss, work)
+        _integrated_form(augmented * scale[:, None] / scale, form * h / scale[:, None] / scale)
+        for form in (loss, work)
     ]
     loss, work = (form * scale[:, None] * scale for form in forms)
-    return Substep(E[:N, :N], E[:N, N:], loss, work)
+    return Substep(exponential[:N, :N], exponential[:N, N:], loss, work)
 
 
-def _gathered(A: Floats, Q: Floats) -> Floats:
-    """integral from 0 to 1 of exp(A^T s) Q exp(A s).
+def _integrated_form(A: Floats, Q: Floats) -> Floats:
+    """Integral from 0 to 1 of exp(A^T s) Q exp(A s).
 
     Over a short stretch by the exponential of [[-A^T, Q], [0, A]], then doubled,
     G(2 t) = G(t) + exp(A^T t) G(t) exp(A t); at once, fast decays would overflow.
@@ -398,9 +416,9 @@ def _gathered(A: Floats, Q: Floats) -> Floats:
     doublings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(A, 1)), 1e-300)))))
     block = np.zeros((2 * M, 2 * M))
     block[:M, :M], block[:M, M:], block[M:, M:] = -A.T, Q, A
-    E = expm(block / 2.0**doublings)
-    step = E[M:, M:]
-    gathered = step.T @ E[:M, M:]
+    exponential = expm(block / 2.0**doublings)
+    step = exponential[M:, M:]
+    integral = step.T @ exponential[:M, M:]
     for _ in range(doublings):
-        gathered, step = gathered + step.T @ gathered @ step, step @ step
-    return np.asarray((gathered + gathered.T) / 2.0)
+        integral, step = integral + step.T @ integral @ step, step @ step
+    return np.asarray((integral + integral.T) / 2.0)

@@ -1,7 +1,7 @@
 """The computer's fixed feedback in a simulation: force sensor, feedforward and local loop, sample by sample.
 
 `docs/control.md` has the equations; `loop.closed_plant` has the same in linear algebra. Dry friction is fed
-forward here only.
+forward here only. In all kernels d is the index of a computer, and of its device.
 """
 
 from __future__ import annotations
@@ -20,6 +20,10 @@ from zwidth.loop.loop_table import low_pass_factors
 
 # Columns of `FeedbackArrays.gains`.
 GAIN, OF_ERROR, INERTIA, DAMPING, COULOMB, DEAD_BAND, LOCAL_STIFFNESS, LOCAL_DAMPING = range(8)
+# Columns of `FeedbackArrays.acts`, of `.delays`, and entries of `FeedbackMemory.first`.
+FORCE_SENSOR, FEEDFORWARD, LOCAL_LOOP = range(3)
+SENSOR_DELAY, LOCAL_DELAY = range(2)
+FIRST_READING, LAST_SPEED, ACTING_COMMAND = range(3)
 PASSES: Final = ((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))  # a factor that changes nothing, and whose state stays 0
 
 
@@ -52,7 +56,7 @@ class FeedbackArrays(NamedTuple):
 class FeedbackMemory(NamedTuple):
     """What one run remembers: readings and commands on their way, and the states of the factors (k, 2).
 
-    first        (3,)   first reading, last velocity of the feedforward, and command that acts
+    first        (3,)   first reading [m], last velocity of the feedforward [m/s], and command that acts [N]
     late         (q,)   measured forces on their way, the newest first
     sensed       (f, 2) states of the force sensor's factors, as the others are of the fields they are named after
     past, fast_past  (w,)  readings that the windows of feedforward and local loop look back on
@@ -72,18 +76,18 @@ class FeedbackMemory(NamedTuple):
 
 def feedback_arrays(controllers: Sequence[Controller], measured: Floats) -> FeedbackArrays:
     """The feedback of these computers; `measured` as in `FeedbackArrays`."""
-    own = [_own_feedback(controller) for controller in controllers]
+    feedbacks = [_feedback(controller) for controller in controllers]
     return FeedbackArrays(
-        acts=np.array([each.acts for each in own], dtype=np.int64),
-        gains=np.array([each.gains for each in own], dtype=np.float64),
-        delays=np.array([each.delays for each in own], dtype=np.int64),
-        splits=np.array([each.splits for each in own], dtype=np.int64),
-        on_sensor=_padded_factors([each.on_sensor for each in own]),
-        window=_padded([each.estimate[0] for each in own]),
-        velocity=_padded_factors([each.estimate[1] for each in own]),
-        acceleration=_padded_factors([each.acceleration for each in own]),
-        fast_window=_padded([each.fast_estimate[0] for each in own]),
-        fast_velocity=_padded_factors([each.fast_estimate[1] for each in own]),
+        acts=np.array([each.acts for each in feedbacks], dtype=np.int64),
+        gains=np.array([each.gains for each in feedbacks], dtype=np.float64),
+        delays=np.array([each.delays for each in feedbacks], dtype=np.int64),
+        splits=np.array([each.splits for each in feedbacks], dtype=np.int64),
+        on_sensor=_padded_factors([each.on_sensor for each in feedbacks]),
+        window=_padded([each.estimate[0] for each in feedbacks]),
+        velocity=_padded_factors([each.estimate[1] for each in feedbacks]),
+        acceleration=_padded_factors([each.acceleration for each in feedbacks]),
+        fast_window=_padded([each.fast_estimate[0] for each in feedbacks]),
+        fast_velocity=_padded_factors([each.fast_estimate[1] for each in feedbacks]),
         measured=measured,
     )
 
@@ -101,9 +105,9 @@ class _Feedback(NamedTuple):
     fast_estimate: tuple[Floats, Floats]
 
 
-def _own_feedback(controller: Controller) -> _Feedback:
+def _feedback(controller: Controller) -> _Feedback:
     """Feedback of one computer in numbers; zeros, and no factors, for a part that it does not have."""
-    T, sensor, ahead, local = (
+    T, sensor, feedforward, local = (
         float(controller.sampling_period),
         controller.force_sensor,
         controller.feedforward,
@@ -112,21 +116,28 @@ def _own_feedback(controller: Controller) -> _Feedback:
     gains = [0.0] * 8
     if sensor is not None:
         gains[GAIN], gains[OF_ERROR] = sensor.gain, float(sensor.law == "force-error")
-    if ahead is not None:
-        gains[INERTIA : DEAD_BAND + 1] = [ahead.inertia, ahead.damping, ahead.coulomb, ahead.dead_band]
+    if feedforward is not None:
+        gains[INERTIA : DEAD_BAND + 1] = [
+            feedforward.inertia,
+            feedforward.damping,
+            feedforward.coulomb,
+            feedforward.dead_band,
+        ]
     if local is not None:
         gains[LOCAL_STIFFNESS], gains[LOCAL_DAMPING] = local.stiffness, local.damping
-    waiting, part = (0, 0.0) if local is None else split_delay(local.delay)
-    none = np.zeros(1), np.zeros((0, 2, 3))
+    whole_samples, part = (0, 0.0) if local is None else split_delay(local.delay)
+    no_estimate = np.zeros(1), np.zeros((0, 2, 3))
     return _Feedback(
-        acts=(sensor is not None, ahead is not None, local is not None),
+        acts=(sensor is not None, feedforward is not None, local is not None),
         gains=gains,
-        delays=(0 if sensor is None else sensor.delay, waiting),
+        delays=(0 if sensor is None else sensor.delay, whole_samples),
         splits=part > 0.0,
         on_sensor=_factors(None if sensor is None else sensor.filter, T),
-        estimate=none if ahead is None else _estimate(ahead.velocity, ahead.velocity_filter, T),
-        acceleration=_factors(None if ahead is None else ahead.acceleration_filter, T),
-        fast_estimate=none
+        estimate=no_estimate
+        if feedforward is None
+        else _estimate(feedforward.velocity, feedforward.velocity_filter, T),
+        acceleration=_factors(None if feedforward is None else feedforward.acceleration_filter, T),
+        fast_estimate=no_estimate
         if local is None
         else _estimate(local.velocity, local.velocity_filter, T / local.rate_multiple),
     )
@@ -139,42 +150,42 @@ def _factors(low_pass: LowPass | None, period: float) -> Floats:
 
 
 def _estimate(method: LinearMethod, low_pass: LowPass | None, period: float) -> tuple[Floats, Floats]:
-    """Window and factors (k, 2, 3) of a velocity estimate behind its low pass."""
-    own = method.estimator(period)
-    factors = np.stack([own.numerator, own.denominator], axis=1)
-    return own.window, np.concatenate([factors, _factors(low_pass, period)])
+    """Window (w,) and factors (k, 2, 3) of a velocity estimate and the low pass behind it; period in s."""
+    estimator = method.estimator(period)
+    factors = np.stack([estimator.numerator, estimator.denominator], axis=1)
+    return estimator.window, np.concatenate([factors, _factors(low_pass, period)])
 
 
 def _padded(windows: Sequence[Floats]) -> Floats:
     """Windows of any lengths as rows (D, w), padded with zeros."""
-    out = np.zeros((len(windows), max(map(len, windows))))
-    for row, window in zip(out, windows, strict=True):
+    padded = np.zeros((len(windows), max(map(len, windows))))
+    for row, window in zip(padded, windows, strict=True):
         row[: len(window)] = window
-    return out
+    return padded
 
 
 def _padded_factors(factors: Sequence[Floats]) -> Floats:
     """Factors (k, 2, 3) of D computers, any k, as (D, k, 2, 3), padded by factors that change no signal."""
-    out = np.empty((len(factors), max(map(len, factors)), 2, 3))
-    out[:] = PASSES
-    for rows, own in zip(out, factors, strict=True):
-        rows[: len(own)] = own
-    return out
+    padded = np.empty((len(factors), max(map(len, factors)), 2, 3))
+    padded[:] = PASSES
+    for room, rows in zip(padded, factors, strict=True):
+        room[: len(rows)] = rows
+    return padded
 
 
 @compiled
 def feedback_memory(arrays: FeedbackArrays, d: int) -> FeedbackMemory:
     """The memory of a computer that has just been switched on."""
     return FeedbackMemory(
-        np.zeros(3),
-        np.zeros(arrays.delays[d, 0] + 1),
-        np.zeros((arrays.on_sensor.shape[1], 2)),
-        np.zeros(arrays.window.shape[1]),
-        np.zeros((arrays.velocity.shape[1], 2)),
-        np.zeros((arrays.acceleration.shape[1], 2)),
-        np.zeros(arrays.fast_window.shape[1]),
-        np.zeros((arrays.fast_velocity.shape[1], 2)),
-        np.zeros(arrays.delays[d, 1] + 2),
+        first=np.zeros(3),
+        late=np.zeros(arrays.delays[d, SENSOR_DELAY] + 1),
+        sensed=np.zeros((arrays.on_sensor.shape[1], 2)),
+        past=np.zeros(arrays.window.shape[1]),
+        velocity=np.zeros((arrays.velocity.shape[1], 2)),
+        acceleration=np.zeros((arrays.acceleration.shape[1], 2)),
+        fast_past=np.zeros(arrays.fast_window.shape[1]),
+        fast_velocity=np.zeros((arrays.fast_velocity.shape[1], 2)),
+        queue=np.zeros(arrays.delays[d, LOCAL_DELAY] + 2),
     )
 
 
@@ -182,7 +193,11 @@ def feedback_memory(arrays: FeedbackArrays, d: int) -> FeedbackMemory:
 def read_force(
     arrays: FeedbackArrays, d: int, states: Floats, command: float, push: float, forces: Floats
 ) -> float:
-    """The force between sensor and hand just before a sample [N], under the command that has acted until then."""
+    """The force between sensor and hand just before a sample [N].
+
+    command, push, forces (E,)  actuator's, hand's and elements' forces that have acted until then [N]
+    """
+    # columns of `measured`: N states, command, push, E elements
     N = arrays.measured.shape[1] - 2 - forces.size
     total = float(arrays.measured[d, N] * command + arrays.measured[d, N + 1] * push)
     for i in range(N):
@@ -203,22 +218,26 @@ def with_feedback(
     sample: int,
     period: float,
 ) -> float:
-    """The command of a sample, in front of the force filter: the wall's force, force feedback and feedforward."""
+    """The command of a sample [N], before the force filter: the wall's force, force feedback and feedforward.
+
+    wall, measured  forces of the wall and of the force sensor [N];   reading  [m];   period  T [s]
+    """
     command = wall
     if sample == 0:
-        memory.first[0] = reading
-    if arrays.acts[d, 0]:
+        memory.first[FIRST_READING] = reading
+    if arrays.acts[d, FORCE_SENSOR]:
         late = memory.late
         for k in range(late.size - 1, 0, -1):
             late[k] = late[k - 1]
         late[0] = measured
-        known = late[late.size - 1] + arrays.gains[d, OF_ERROR] * wall
-        command += arrays.gains[d, GAIN] * cascade(arrays.on_sensor[d], memory.sensed, known)
-    if arrays.acts[d, 1]:
-        moved = weigh_readings(arrays.window[d], memory.past, reading - memory.first[0])
+        # the oldest measured force, that of the hand; a force error is 0 where it balances the wall's
+        fed_back = late[late.size - 1] + arrays.gains[d, OF_ERROR] * wall
+        command += arrays.gains[d, GAIN] * cascade(arrays.on_sensor[d], memory.sensed, fed_back)
+    if arrays.acts[d, FEEDFORWARD]:
+        moved = weigh_readings(arrays.window[d], memory.past, reading - memory.first[FIRST_READING])
         speed = cascade(arrays.velocity[d], memory.velocity, moved)
-        change = (speed - memory.first[1]) / period
-        memory.first[1] = speed
+        change = (speed - memory.first[LAST_SPEED]) / period
+        memory.first[LAST_SPEED] = speed
         acceleration = cascade(arrays.acceleration[d], memory.acceleration, change)
         command += arrays.gains[d, INERTIA] * acceleration + arrays.gains[d, DAMPING] * speed
         if abs(speed) > arrays.gains[d, DEAD_BAND]:
@@ -228,8 +247,8 @@ def with_feedback(
 
 @compiled_inline
 def sample_local_loop(arrays: FeedbackArrays, d: int, memory: FeedbackMemory, reading: float) -> None:
-    """One sample of the local loop: its command goes to the head of its queue."""
-    moved = weigh_readings(arrays.fast_window[d], memory.fast_past, reading - memory.first[0])
+    """One sample of the local loop: the force of its spring and damper [N] goes to the head of its queue."""
+    moved = weigh_readings(arrays.fast_window[d], memory.fast_past, reading - memory.first[FIRST_READING])
     speed = cascade(arrays.fast_velocity[d], memory.fast_velocity, moved)
     queue = memory.queue
     for k in range(queue.size - 1, 0, -1):

@@ -11,7 +11,18 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
 from zwidth.contact.computer import PlantArrays
-from zwidth.contact.plant_step import VARYING
+from zwidth.contact.plant_step import (
+    BRAKE_AFTER,
+    BRAKE_COMMANDED,
+    BRAKE_DAMPING,
+    BRAKE_LAG,
+    MEAN_DAMPING,
+    MEAN_STIFFNESS,
+    ONSET,
+    REST,
+    ROLE,
+    VARYING,
+)
 from zwidth.model.operator import Operator
 from zwidth.result import Documented, entry
 
@@ -22,6 +33,20 @@ GRASP: Final = 2.0
 
 PUSH_NUMBERS: Final = 9
 REFLEX_NUMBERS: Final = 7
+# Entries of `Hand.push_numbers`; the two of a reach are its distance times the arm's stiffness and damping.
+(
+    PUSH,
+    RAMP,
+    REACH_SPRING,
+    REACH_DAMPER,
+    REACH_START,
+    REACH_DURATION,
+    TREMOR_AMPLITUDE,
+    TREMOR_PULSATION,
+    TREMOR_PHASE,
+) = range(PUSH_NUMBERS)
+# Entries of `Hand.reflex_numbers`: then stiffness and damping of the arm, and the same of the grasp.
+THRESHOLD, LATENCY, RISE, ARM_AMOUNTS, GRASP_AMOUNTS = 0, 1, 2, 3, 5
 
 
 @dataclass(frozen=True)
@@ -123,30 +148,35 @@ class Hand(Documented):
 
     @property
     def push_numbers(self) -> Floats:
-        """Numbers (9,) for `hand_force`: push, ramp; reach times stiffness and damping of the arm, its start and
-        duration; amplitude, angular frequency and phase of the tremor."""
+        """Numbers (9,) for `hand_force`, PUSH to TREMOR_PHASE: push [N], ramp [s]; distance of the reach times
+        stiffness [N] and damping [N s] of the arm, its start and duration [s]; amplitude [N], angular frequency
+        [rad/s] and phase of the tremor. Zeros for a movement that there is not."""
         numbers = np.zeros(PUSH_NUMBERS)
-        numbers[:2] = self.push, self.ramp
+        numbers[PUSH], numbers[RAMP] = self.push, self.ramp
         if self.reach is not None and self.operator is not None:
             distance = self.reach.distance
-            numbers[2:4] = distance * self.operator.arm_stiffness, distance * self.operator.arm_damping
-            numbers[4:6] = self.reach.start, self.reach.duration
+            numbers[REACH_SPRING] = distance * self.operator.arm_stiffness
+            numbers[REACH_DAMPER] = distance * self.operator.arm_damping
+            numbers[REACH_START], numbers[REACH_DURATION] = self.reach.start, self.reach.duration
         if self.tremor is not None:
-            numbers[6:] = self.tremor.amplitude, 2.0 * pi * self.tremor.frequency, self.tremor.phase
+            numbers[TREMOR_AMPLITUDE:] = self.tremor.amplitude, 2.0 * pi * self.tremor.frequency, self.tremor.phase
         return numbers
 
     @property
     def reflex_numbers(self) -> Floats:
-        """Fields of the reflex (7,) for `sample_brakes_and_reflexes`; an infinite threshold for none."""
-        own = self.reflex
-        if own is None:
+        """Fields of the reflex (7,) in order, for `sample_brakes_and_reflexes`; an infinite threshold for none."""
+        reflex = self.reflex
+        if reflex is None:
             return np.array([inf, *np.zeros(REFLEX_NUMBERS - 1)])
-        amounts = (own.arm_stiffness, own.arm_damping, own.grasp_stiffness, own.grasp_damping)
-        return np.array([own.threshold, own.latency, own.rise, *amounts])
+        amounts = (reflex.arm_stiffness, reflex.arm_damping, reflex.grasp_stiffness, reflex.grasp_damping)
+        return np.array([reflex.threshold, reflex.latency, reflex.rise, *amounts])
 
 
 def _check(name: str, value: float, unit: str, least: float, *, open_end: bool = False) -> None:
-    """Raise ValueError for a number that is not finite or below `least`, with `open_end` also for that itself."""
+    """Raise ValueError, with name and unit, for a number that is not finite or below `least`.
+
+    open_end  True: `least` itself is not allowed either
+    """
     if not isfinite(value) or value < least or (open_end and value == least):
         allowed = "finite" if least == -inf else "positive" if open_end else "finite and not negative"
         raise ValueError(f"{name} must be {allowed} [{unit}], got {value!r}")
@@ -155,14 +185,16 @@ def _check(name: str, value: float, unit: str, least: float, *, open_end: bool =
 @compiled_lean
 def hand_force(numbers: Floats, m: int, time: float) -> float:
     """Force by push, reach and tremor of run m at a time [N]; numbers (., 9) as of `Hand.push_numbers`."""
-    push, ramp = numbers[m, 0], numbers[m, 1]
+    push, ramp = numbers[m, PUSH], numbers[m, RAMP]
     force = float(push * min(time / ramp, 1.0) if ramp > 0.0 else push)
-    if numbers[m, 5] > 0.0 and time > numbers[m, 4]:
-        s = min((time - numbers[m, 4]) / numbers[m, 5], 1.0)
-        force += numbers[m, 2] * s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        force += numbers[m, 3] * 30.0 * s * s * (1.0 - s) * (1.0 - s) / numbers[m, 5]
-    if numbers[m, 6] != 0.0:
-        force += numbers[m, 6] * sin(numbers[m, 7] * time + numbers[m, 8])
+    start, duration = numbers[m, REACH_START], numbers[m, REACH_DURATION]
+    if duration > 0.0 and time > start:
+        # the arm's spring and damper pull towards its rest position x_0(t): see `Reach`, with its derivative
+        s = min((time - start) / duration, 1.0)
+        force += numbers[m, REACH_SPRING] * s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        force += numbers[m, REACH_DAMPER] * 30.0 * s * s * (1.0 - s) * (1.0 - s) / duration
+    if numbers[m, TREMOR_AMPLITUDE] != 0.0:
+        force += numbers[m, TREMOR_AMPLITUDE] * sin(numbers[m, TREMOR_PULSATION] * time + numbers[m, TREMOR_PHASE])
     return force
 
 
@@ -179,46 +211,50 @@ def sample_brakes_and_reflexes(
 ) -> None:
     """At a sample: what brakes and reflexes are to become, into memory (E, 4).
 
-    memory  of a brake: -, damping now, damping commanded, damping after the substep; it is on while the
-            environment asks for a force
-            of a reflex: stiffness, damping now, rest position, and the time of its onset plus one period, so that
-            0 says not yet; negative once it acts, which begins at a sample
+    reflex  (7,)  `Hand.reflex_numbers`;   force  that the environment asks for [N];   states (R,)  of the plant
+    memory  of a brake: BRAKE_COMMANDED, its damping while the environment asks for a force, else 0
+            of a reflex: REST, where it begins, and ONSET, the time of its onset plus one period, so that 0 says
+            not yet; negative once it acts, which begins at a sample
     """
     n = devices.size[d]
     for e in range(devices.kind.shape[1]):
         if devices.kind[d, e] != VARYING:
             continue
-        if devices.numbers[d, e, 0] == BRAKE:
-            memory[e, 2] = devices.numbers[d, e, 1] if force != 0.0 else 0.0
+        if devices.numbers[d, e, ROLE] == BRAKE:
+            memory[e, BRAKE_COMMANDED] = devices.numbers[d, e, BRAKE_DAMPING] if force != 0.0 else 0.0
             continue
-        if memory[e, 3] == 0.0 and abs(force) > reflex[0]:
-            memory[e, 3] = time + period + reflex[1]
-        if memory[e, 3] > 0.0 and time + period >= memory[e, 3]:
-            memory[e, 3] = -memory[e, 3]
+        if memory[e, ONSET] == 0.0 and abs(force) > reflex[THRESHOLD]:
+            memory[e, ONSET] = time + period + reflex[LATENCY]
+        if memory[e, ONSET] > 0.0 and time + period >= memory[e, ONSET]:
+            memory[e, ONSET] = -memory[e, ONSET]
             rest = 0.0
             for k in range(n):
                 rest += devices.along[d, e, k] * states[k]
-            memory[e, 2] = rest
+            memory[e, REST] = rest
 
 
 @compiled_lean
 def step_brakes_and_reflexes(
     devices: PlantArrays, d: int, reflex: Floats, m: int, time: float, h: float, period: float, memory: Floats
 ) -> None:
-    """Over a substep from `time` on: what brakes and reflexes of run m are worth on the average."""
+    """Mean stiffness and damping of the brakes and reflexes of run m over a substep, into memory (E, 4).
+
+    reflex  (., 7)  `Hand.reflex_numbers`;   time, h  begin and length of the substep [s];   period  T [s]
+    """
     for e in range(devices.kind.shape[1]):
         if devices.kind[d, e] != VARYING:
             continue
-        role = devices.numbers[d, e, 0]
+        role = devices.numbers[d, e, ROLE]
         if role == BRAKE:
-            wanted, lag, now = memory[e, 2], devices.numbers[d, e, 2], memory[e, 3]
+            wanted, lag, now = memory[e, BRAKE_COMMANDED], devices.numbers[d, e, BRAKE_LAG], memory[e, BRAKE_AFTER]
             fade = exp(-h / lag) if lag > 0.0 else 0.0
             # the mean over the substep of the exponential approach to what is wanted
-            memory[e, 1] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
-            memory[e, 3] = wanted + (now - wanted) * fade
-        elif memory[e, 3] < 0.0:
-            since = time + 0.5 * h + memory[e, 3] + period
-            grasp = 2 if role == GRASP else 0
-            level = 1.0 - exp(-since / reflex[m, 2]) if reflex[m, 2] > 0.0 else 1.0
-            memory[e, 0] = reflex[m, 3 + grasp] * level
-            memory[e, 1] = reflex[m, 4 + grasp] * level
+            memory[e, MEAN_DAMPING] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
+            memory[e, BRAKE_AFTER] = wanted + (now - wanted) * fade
+        elif memory[e, ONSET] < 0.0:
+            # in the middle of the substep, since the onset
+            since = time + 0.5 * h + memory[e, ONSET] + period
+            amounts = GRASP_AMOUNTS if role == GRASP else ARM_AMOUNTS
+            level = 1.0 - exp(-since / reflex[m, RISE]) if reflex[m, RISE] > 0.0 else 1.0
+            memory[e, MEAN_STIFFNESS] = reflex[m, amounts] * level
+            memory[e, MEAN_DAMPING] = reflex[m, amounts + 1] * level

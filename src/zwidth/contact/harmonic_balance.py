@@ -188,26 +188,27 @@ def harmonic_balance(
         raise ValueError(f"the wall must be finite, got K = {wall_stiffness} N/m, B = {wall_damping} N s/m")
     if not largest_motion > 0.0:
         raise ValueError(f"largest_motion must be positive, got {largest_motion} m")
-    own = equivalent_loop(loop, wall_stiffness, wall_damping, parts, force_limit=limit, offset=offset)
-    if not (own.parts.friction or own.parts.counters or own.parts.springs or np.isfinite(limit)):
-        return _nothing(largest_motion)
-    at = _amplitudes(own, amplitudes)
+    equivalent = equivalent_loop(loop, wall_stiffness, wall_damping, parts, force_limit=limit, offset=offset)
+    left = equivalent.parts
+    if not (left.friction or left.counters or left.springs or np.isfinite(limit)):
+        return _empty_balance(largest_motion)
+    at = _amplitudes(equivalent, amplitudes)
     if not len(at):
-        return _nothing(largest_motion)
+        return _empty_balance(largest_motion)
     tell, steps = progress or (lambda stage, done, of: None), 2 * len(at) + 1
-    swings = _followed(own, at, lambda done: tell(STAGE, done, steps))
+    swings = _fastest_by_amplitude(equivalent, at, lambda done: tell(STAGE, done, steps))
     balance = HarmonicBalance(
         at,
-        np.array([_growth(own, swing) for swing in swings]),
-        np.array([_frequency(own, swing) if swing else np.nan for swing in swings]),
-        tuple(replace(cycle, largest_motion=largest_motion) for cycle in _crossings(own, at, swings)),
+        np.array([_growth(equivalent, swing) for swing in swings]),
+        np.array([_frequency(equivalent, swing) if swing else np.nan for swing in swings]),
+        tuple(replace(cycle, largest_motion=largest_motion) for cycle in _crossings(equivalent, at, swings)),
         largest_motion,
     )
     tell(STAGE, steps, steps)
     return balance
 
 
-def _nothing(largest_motion: float) -> HarmonicBalance:
+def _empty_balance(largest_motion: float) -> HarmonicBalance:
     """Empty balance, of a loop in which nothing depends on the amplitude."""
     return HarmonicBalance(np.zeros(0), np.zeros(0), np.zeros(0), (), largest_motion)
 
@@ -215,9 +216,9 @@ def _nothing(largest_motion: float) -> HarmonicBalance:
 def _parts(
     loop: Loop, coulomb_friction: ArrayLike | None, resolution: float | None, force_limit: float | None
 ) -> tuple[Nonlinear, float]:
-    """The plant's nonlinear parts, friction and encoder steps given here in place of its own, and the force limit.
+    """The plant's nonlinear parts, with friction and encoder steps given here, and the force limit [N].
 
-    coulomb_friction, resolution, force_limit  [N], [m], [N]; None: the loop's own
+    coulomb_friction, resolution, force_limit  [N], [m], [N], as in `harmonic_balance`; None: the loop's own
     """
     plant, parts = loop.plant, loop.plant.nonlinear
     if coulomb_friction is not None:
@@ -240,7 +241,10 @@ def _parts(
 
 
 def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Floats:
-    """Amplitudes to look at: even in the logarithm, and denser where the quantiser's gain has its humps."""
+    """Amplitudes (p,) to look at [m]: even in the logarithm, and denser where the quantiser's gain has its humps.
+
+    bounds  lowest and highest [m]; None: by what the nonlinear parts suggest, none where they suggest nothing
+    """
     T, parts = loop.loop.period, loop.parts
     stiffness = abs(loop.wall_stiffness) + abs(loop.wall_damping) / T
     steps = [abs(part.weight) * part.step for part in parts.counters if part.step > 0.0]
@@ -251,7 +255,7 @@ def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Flo
     scales += [np.sqrt(stiffness / abs(part.cubic)) for part in parts.springs if part.cubic and stiffness]
     if not scales and bounds is None:
         return np.zeros(0)
-    middle = abs(loop.offset - round(loop.offset))
+    middle = abs(loop.offset - round(loop.offset))  # distance from the nearest count, in steps
     below = BELOW_RELAY if steps and middle > 0.0 else BELOW
     low, high = bounds if bounds else (below * min(scales), ABOVE * max(scales))
     if not 0.0 < low < high < np.inf:
@@ -259,6 +263,7 @@ def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Flo
     grid = np.geomspace(low, high, max(2, int(PER_DECADE * np.log10(high / low)) + 1))
     for step in steps:
         for k in range(STEPS_RESOLVED):
+            # amplitudes at which the sine reaches another threshold to either side, and the gain jumps
             for edge in (k + 0.5 - middle, k + 0.5 + middle):
                 inside = np.concatenate([[1e-9, 1e-4, 1e-2], np.linspace(0.04, 0.98, 12)])
                 grid = np.append(grid, step * (edge + inside))
@@ -266,8 +271,10 @@ def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Flo
     return grid[(grid >= low) & (grid <= high)]
 
 
-def _followed(loop: EquivalentLoop, amplitudes: Floats, tell: Callable[[int], None]) -> list[Vibration | None]:
-    """The fastest growing vibration at each amplitude, followed downwards and upwards.
+def _fastest_by_amplitude(
+    loop: EquivalentLoop, amplitudes: Floats, tell: Callable[[int], None]
+) -> list[Vibration | None]:
+    """The fastest growing vibration at each amplitude (p,) [m], followed down and up; None where nothing swings.
 
     More than one kind of vibration may agree with the gains that it makes itself, so both ways count.
     tell  called with how many amplitudes are done, of both ways
@@ -308,31 +315,37 @@ def _frequency(loop: EquivalentLoop, swing: Vibration) -> float:
 
 
 def _crossings(loop: EquivalentLoop, at: Floats, swings: list[Vibration | None]) -> list[LimitCycle]:
-    """Limit cycles where growth changes sign between amplitudes `at` (p,) [m], stable where larger ones die."""
+    """Limit cycles where growth changes sign between amplitudes `at` (p,) [m], stable where larger ones die.
+
+    swings  vibration at each; None: nothing swings
+    """
     crossings = []
-    for one, two in pairwise(swings):
-        if two is None or (one is None and abs(two.root) <= 1.0):
+    for smaller, larger in pairwise(swings):
+        if larger is None or (smaller is None and abs(larger.root) <= 1.0):
             continue
-        if one is not None and (abs(one.root) > 1.0) == (abs(two.root) > 1.0):
+        if smaller is not None and (abs(smaller.root) > 1.0) == (abs(larger.root) > 1.0):
             continue
-        root = _bisect(loop, one, two, amplitude_of) if one is not None else None
-        if root is None and abs(two.root) > 1.0 and loop.parts.friction:
-            root = _folded(loop, two)
-        if root is not None:
-            stable = one is not None and abs(one.root) > 1.0
+        cycle = _bisect(loop, smaller, larger, amplitude_of) if smaller is not None else None
+        if cycle is None and abs(larger.root) > 1.0 and loop.parts.friction:
+            cycle = _cycle_below_fold(loop, larger)
+        if cycle is not None:
+            stable = smaller is not None and abs(smaller.root) > 1.0
             crossings.append(
-                LimitCycle(root.amplitude, _frequency(loop, root), stable, root.force, root.velocities)
+                LimitCycle(cycle.amplitude, _frequency(loop, cycle), stable, cycle.force, cycle.velocities)
             )
     return sorted(crossings, key=lambda cycle: cycle.amplitude)
 
 
 def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: SizeFunction) -> Vibration | None:
-    """The vibration of growth 0 between one that dies and one that grows; None where growth jumps over it."""
+    """The vibration of growth 0 between one that dies and one that grows; None where growth jumps over it.
+
+    low, high  the two, by size;   measure  their size
+    """
     from scipy.optimize import brentq
 
     known = [low, high]
 
-    def grown(logarithm: float) -> Vibration | None:
+    def fastest(logarithm: float) -> Vibration | None:
         """Fastest growing vibration of a size, given by its logarithm; None where nothing swings."""
         size = float(np.exp(logarithm))
         below = max((swing for swing in known if measure(swing) <= size), key=measure, default=low)
@@ -351,19 +364,21 @@ def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: Size
         """Growth per sample, ln |z|, of the vibration of a size given by its logarithm; -1 where none swings."""
         if logarithm in at_ends:
             return at_ends[logarithm]
-        vibration = grown(logarithm)
+        vibration = fastest(logarithm)
         return float(np.log(abs(vibration.root))) if vibration else -1.0
 
     where = brentq(growth, *ends, xtol=1e-13, rtol=1e-13)
-    vibration = grown(where)
+    vibration = fastest(where)
     return vibration if vibration is not None and abs(abs(vibration.root) - 1.0) < ON_CIRCLE else None
 
 
-def _folded(loop: EquivalentLoop, start: Vibration) -> Vibration | None:
+def _cycle_below_fold(loop: EquivalentLoop, start: Vibration) -> Vibration | None:
     """The limit cycle below a vibration that grows, where dry friction lets no smaller amplitude at the sensor be.
 
     The more a vibration shrinks the more friction holds it, until less velocity goes with more amplitude; there
     the velocity says how large it is.
+
+    Returns  None where nothing swings on the way, or everything still grows after FOLDED steps
     """
     high = start
     for _ in range(FOLDED):
@@ -408,6 +423,7 @@ def with_harmonics(
     limit = loop.nonlinear.force_limit if force_limit is None else force_limit
     if not 0.0 < limit < np.inf:
         raise ValueError(f"harmonics are those of a limited force, and its limit is {limit} N")
+    # forces in units of the limit: positions come out in metres per such unit
     transition, gain, command = equivalent_loop(loop, wall_stiffness, wall_damping, Nonlinear()).open_at_limit()
     sensor = np.zeros(len(gain))
     sensor[: loop.plant.size] = loop.plant.sensor
@@ -430,11 +446,14 @@ def with_harmonics(
 
 
 def _longer(start: Floats, count: int) -> Floats:
-    """A solution with more harmonics, which are 0: logarithms of the first and of its angle, then the others'
-    real and imaginary parts."""
-    before = len(start) // 2
-    more = np.zeros(count - before)
-    return np.concatenate([start[: before + 1], more, start[before + 1 :], more])
+    """A solution (2 count,) with more harmonics, which are 0, from one with fewer.
+
+    Its elements: logarithm of the first harmonic, in units of the limit, and of the angle per sample [rad]; then
+    real and imaginary parts of the other harmonics over the first one.
+    """
+    known = len(start) // 2  # harmonics
+    more = np.zeros(count - known)
+    return np.concatenate([start[: known + 1], more, start[known + 1 :], more])
 
 
 class _OpenLoop:
@@ -449,26 +468,30 @@ class _OpenLoop:
         """Solution (2 count,) with so many harmonics (see `_longer`), by Newton's method; None where it fails."""
         from scipy.optimize import root
 
-        def left(unknown: Floats) -> Floats:
-            """Residuals over the size of the first harmonic: real parts (h,), then imaginary ones."""
+        def residuals(unknown: Floats) -> Floats:
+            """Residuals over the size of the first harmonic: real parts (count,), then imaginary ones."""
             W, angle = _harmonic_parts(unknown, count)
-            rest = (self._loop_response(angle, count)[0] * self._limited(W) - W) / abs(W[0])
-            return np.concatenate([rest.real, rest.imag])
+            residual = (self._loop_response(angle, count)[0] * self._limited(W) - W) / abs(W[0])
+            return np.concatenate([residual.real, residual.imag])
 
         with np.errstate(all="ignore"):
-            solution = root(left, start, tol=1e-12)
-            good = np.all(np.isfinite(solution.x)) and np.max(np.abs(left(solution.x))) < SOLVED
+            solution = root(residuals, start, tol=1e-12)
+            good = np.all(np.isfinite(solution.x)) and np.max(np.abs(residuals(solution.x))) < SOLVED
         return np.asarray(solution.x) if good else None
 
     def vibration(self, solution: Floats, count: int) -> tuple[float, float, float]:
-        """Half of peak to peak of the commanded force and of the position, and the angle per sample."""
+        """Half of peak to peak of the commanded force and of the sensor's position, both over the limit, and the
+        angle per sample [rad]."""
         W, angle = _harmonic_parts(solution, count)
         position = self._loop_response(angle, count)[1] * self._limited(W)
         force, place = (0.5 * float(np.ptp(self._over_phases(part))) for part in (W, position))
         return force, place, angle
 
     def _loop_response(self, angle: float, count: int) -> Complexes:
-        """Responses (2, h) of commanded force and sensor's motion to the acting force; angle per sample [rad]."""
+        """Responses (2, count), of commanded force and sensor's motion, to the acting force at odd harmonics.
+
+        angle  of the first harmonic, per sample [rad]
+        """
         size, orders = len(self.transition), np.arange(1, 2 * count, 2)
         z = np.exp(1j * angle * orders)[:, None, None]
         inner = np.linalg.solve(z * np.eye(size) - self.transition, self.force[:, None].astype(complex))[..., 0]

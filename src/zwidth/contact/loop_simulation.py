@@ -116,7 +116,7 @@ def simulate_batch(
               HysteresisError, UnmovedError  for plants that cannot move in time, or not by the wall
     """
     lengths = np.broadcast_to(np.asarray(duration, dtype=float), (len(runs),))
-    _check(lengths, substeps)
+    _check_durations(lengths, substeps)
     held_devices, index = _held_devices(runs)
     period = np.array([held_device.loop.period for held_device in held_devices])[index]
     samples = np.array([1 + ceil(length / T * (1.0 - 1e-12)) for length, T in zip(lengths, period, strict=True)])
@@ -124,25 +124,31 @@ def simulate_batch(
     if not trail and not ledger and not any(held_device.elements for held_device in held_devices):
         substeps = 1
     plants = pack_plants(held_devices, substeps)
+    # handle positions of a run: one after each substep
     fine = S * int(plants.substeps.sum(axis=1).max()) if trail else 0
     _check_memory(m, S, fine, ledger)
     controllers = [held_device.loop.controller for held_device in held_devices]
-    own = computers(controllers, [held_device.limit for held_device in held_devices])
+    computer_arrays = computers(controllers, [held_device.limit for held_device in held_devices])
     feedback = feedback_arrays(controllers, reading_rows(held_devices, plants))
     records = _empty_records(m, S, fine, ledger)
-    members = _members(runs, held_devices, index, plants)
+    members = _run_arrays(runs, held_devices, index, plants)
     with watched(progress, "simulating", lambda: int(records.samples.sum()), int(samples.sum())):
-        in_chunks(partial(run_several, plants, own, feedback, members, samples, environment.address, records), m)
+        in_chunks(
+            partial(
+                run_several, plants, computer_arrays, feedback, members, samples, environment.address, records
+            ),
+            m,
+        )
     return [
         TimeResponse.of(
-            _plan(run, held_devices[index[i]], plants, index[i], int(samples[i]), environment), records, i
+            _settings(run, held_devices[index[i]], plants, index[i], int(samples[i]), environment), records, i
         )
         for i, run in enumerate(runs)
     ]
 
 
 def _check_memory(m: int, S: int, fine: int, ledger: bool) -> None:
-    """Raise TooLarge where the records of m runs of S samples do not fit into memory; see `_empty_records`."""
+    """Raise TooLarge where the records of `_empty_records`, for these arguments, do not fit into memory."""
     check_memory(
         m * float(S * (TRACES + (ENTRIES if ledger else 0)) + fine),
         f"{m} run{'s' * (m > 1)} of {S} samples",
@@ -161,10 +167,10 @@ def _empty_records(m: int, S: int, fine: int, ledger: bool) -> Records:
     )
 
 
-def _plan(
+def _settings(
     run: Run, held_device: HeldDevice, plants: PlantArrays, d: int, samples: int, environment: Environment
 ) -> RunSettings:
-    """Settings of one run, for its `TimeResponse`."""
+    """Settings of one run, for its `TimeResponse`; d  index of its device in `plants`."""
     counters = held_device.counters
     plain = not held_device.elements and run.passivity is None and isinf(held_device.limit)
     plain = plain and not isinstance(held_device.loop.controller.velocity, Foaw | Levant)
@@ -185,15 +191,15 @@ def _plan(
 
 
 def _offsets(plants: PlantArrays, d: int) -> Floats:
-    """Ends of the substeps after a sample [s]."""
-    begun, offsets = 0.0, [np.zeros(0)]
+    """Ends of the substeps (p,) of an interval, in time after its sample [s]; d  index of the device."""
+    begun, offsets = 0.0, [np.zeros(0)]  # begin of a part
     for count, h in zip(plants.substeps[d], plants.length[d], strict=True):
         offsets.append(begun + h * np.arange(1, count + 1))
         begun += count * h
     return np.concatenate(offsets)
 
 
-def _check(lengths: Floats, substeps: int) -> None:
+def _check_durations(lengths: Floats, substeps: int) -> None:
     """Raise ValueError for durations [s] that are not positive and finite, or a wrong number of substeps."""
     for length in lengths:
         if not (isfinite(length) and length > 0.0):
@@ -202,7 +208,10 @@ def _check(lengths: Floats, substeps: int) -> None:
 
 
 def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], Ints]:
-    """One held device for all runs of the same loop, arm and reflex or none, and which run has which (m,)."""
+    """Prepare one held device for all runs with the same loop, operator, and reflex or none.
+
+    Returns  the held devices, and the index (m,) of each run's
+    """
     numbers: dict[tuple[object, ...], int] = {}
     held_devices: list[HeldDevice] = []
     index = []
@@ -216,15 +225,17 @@ def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], Ints]:
     return held_devices, np.array(index, dtype=np.int64)
 
 
-def _members(runs: Sequence[Run], held_devices: list[HeldDevice], index: Ints, plants: PlantArrays) -> RunArrays:
+def _run_arrays(
+    runs: Sequence[Run], held_devices: list[HeldDevice], index: Ints, plants: PlantArrays
+) -> RunArrays:
     """The runs as arrays for the engine; index (m,) names the device of each."""
     m = len(runs)
     start = np.zeros((m, plants.transition.shape[-2]))
     for i, run in enumerate(runs):
         held_device = held_devices[index[i]]
         start[i] = start_states(held_device, plants, int(index[i]), *_start(held_device, run))
-    watched = [np.array([np.nan]) if run.passivity is None else run.passivity.parameters for run in runs]
-    width = max(len(numbers) for numbers in watched)
+    observers = [np.array([np.nan]) if run.passivity is None else run.passivity.parameters for run in runs]
+    width = max(len(numbers) for numbers in observers)
     return RunArrays(
         device=index,
         start=start,
@@ -232,14 +243,17 @@ def _members(runs: Sequence[Run], held_devices: list[HeldDevice], index: Ints, p
         values=np.stack([run.values for run in runs]),
         push=np.stack([run.hand.push_numbers for run in runs]).reshape(m, PUSH_NUMBERS),
         reflex=np.stack([run.hand.reflex_numbers for run in runs]).reshape(m, REFLEX_NUMBERS),
-        observer=np.stack([np.pad(numbers, (0, width - len(numbers))) for numbers in watched]),
+        observer=np.stack([np.pad(numbers, (0, width - len(numbers))) for numbers in observers]),
         seed=np.array([run.seed for run in runs], dtype=np.uint64),
         bound=np.array([run.bound for run in runs], dtype=float),
     )
 
 
 def _start(held_device: HeldDevice, run: Run) -> tuple[Floats, Floats]:
-    """Coordinates and velocities (n,) at the start of a run. Raises ValueError for other shapes."""
+    """Coordinates and velocities (n,) of the attached plant at the start of a run.
+
+    Raises  ValueError  for a given start of another shape
+    """
     n = held_device.attached_plant.size
     if run.start is None:
         return run.start_position * held_device.undeformed, run.start_velocity * held_device.undeformed

@@ -42,7 +42,7 @@ from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 
 PASSIVITY_MEMORY: Final = 4
-BEGUN, LAST, ENERGY, LAST_FORCE = range(PASSIVITY_MEMORY)
+BEGUN, LAST_POSITION, ENERGY, LAST_FORCE = range(PASSIVITY_MEMORY)
 REFERENCE, LARGEST_DAMPING, LARGEST_FORCE, DEVICE_DAMPING, HELD = range(5)
 
 
@@ -108,16 +108,16 @@ class PassivityController:
 def passivity_force(memory: Floats, parameters: Floats, force: float, position: float, period: float) -> float:
     """The environment's force with what the controller adds to it.
 
-    memory      (4,)  zeros at the start; [2] is the energy that the environment has taken [J]: as counted "held"
-                      before this sample's force acts, as counted "sampled" with the controller's part
-    parameters  (5,)  `PassivityController.parameters`
+    memory      (4,)  BEGUN to LAST_FORCE, zeros at the start; ENERGY is what the environment has taken [J]:
+                      counted "held" before this sample's force acts, counted "sampled" with the controller's part
+    parameters  (5,)  REFERENCE to HELD, from `PassivityController.parameters`
     force       on the device along +y [N];   position  as counted [m];   period  T [s]
     Returns     the force to be sent [N]; the same force at the first sample and where the device does not move
     """
     if memory[BEGUN] == 0.0:
-        memory[BEGUN], memory[LAST], memory[LAST_FORCE] = 1.0, position, force
+        memory[BEGUN], memory[LAST_POSITION], memory[LAST_FORCE] = 1.0, position, force
         return force
-    moved = position - memory[LAST]
+    moved = position - memory[LAST_POSITION]
     held = parameters[HELD] > 0.0
     energy = memory[ENERGY] - (memory[LAST_FORCE] if held else force) * moved
     if held:
@@ -130,7 +130,7 @@ def passivity_force(memory: Floats, parameters: Floats, force: float, position: 
         extra = -np.sign(moved) * min(damping * abs(moved) / period, parameters[LARGEST_FORCE])
     if not held:
         energy -= extra * moved
-    memory[LAST], memory[ENERGY], memory[LAST_FORCE] = position, energy, force + extra
+    memory[LAST_POSITION], memory[ENERGY], memory[LAST_FORCE] = position, energy, force + extra
     return float(force + extra)
 
 
@@ -149,6 +149,7 @@ def rendered_stiffness(position: ArrayLike, force: ArrayLike, wall_position: flo
     x, f = np.asarray(position, dtype=float), np.asarray(force, dtype=float)
     if x.shape != f.shape or x.ndim != 1:
         raise ValueError(f"position and force must be series of one length, got shapes {x.shape} and {f.shape}")
+    # outside 0 x, so that a nan is kept
     penetration = np.where(x - wall_position > 0.0, x - wall_position, 0.0 * x)
-    below = float(penetration @ penetration)
-    return -float(f @ penetration) / below if below > 0.0 else float("nan")
+    squares = float(penetration @ penetration)
+    return -float(f @ penetration) / squares if squares > 0.0 else float("nan")

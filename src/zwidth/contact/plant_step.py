@@ -2,7 +2,8 @@
 elements that answer to them.
 
 These kernels index element by element and count no references: a substep of a few states costs less than counting
-would.
+would. In all of them d is the index of a device, part that of a part of an interval, e that of an element, and h
+the length of a substep [s]; `computer.PlantArrays` says what their arrays hold.
 
 Nonlinear elements on one motion of the plant: the mean force of each over a substep.
 
@@ -57,17 +58,17 @@ def motion_from(devices: PlantArrays, start: Floats) -> PlantState:
 
 
 @compiled_inline
-def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
-    """Dot product a[row, :count] . b[start:start + count]."""
+def dot(rows: Floats, row: int, vector: Floats, start: int, count: int) -> float:
+    """Dot product rows[row, :count] . vector[start:start + count]."""
     total = 0.0
     for k in range(count):
-        total += a[row, k] * b[start + k]
+        total += rows[row, k] * vector[start + k]
     return total
 
 
 @compiled_inline
 def read_sensor(devices: PlantArrays, d: int, states: Floats, truth: float, drawn: Floats) -> float:
-    """The reading as the encoders count it; the true one where they have neither steps nor noise.
+    """The reading as the encoders count it [m]; `truth`, the true one, where they have neither steps nor noise.
 
     drawn  (C,)  noise of each encoder's position, drawn already, in its own unit
     """
@@ -99,7 +100,10 @@ def set_held_increment(inputs: Floats, d: int, part: int, command: float, push: 
 
 @compiled_inline
 def predict_motions(A: Floats, d: int, part: int, state: PlantState) -> None:
-    """Fill in the elements' motions after the substep, as they are if no element acts."""
+    """Fill in the elements' motions after the substep, as they are if no element acts.
+
+    A  (D, P, R, N)  `PlantArrays.transition`, of whose R rows those from N on are these motions
+    """
     for i in range(A.shape[3], A.shape[2]):
         total = state.held_increment[i]
         for k in range(A.shape[3]):
@@ -110,6 +114,8 @@ def predict_motions(A: Floats, d: int, part: int, state: PlantState) -> None:
 @compiled_inline
 def step(A: Floats, inputs: Floats, d: int, part: int, state: PlantState) -> None:
     """The substep: all states anew, with the forces of the elements.
+
+    A, inputs  `PlantArrays.transition` and `PlantArrays.inputs`
 
     In one go and from one array into the other; to add to what has just been stored would wait for the store.
     """
@@ -126,12 +132,14 @@ def step(A: Floats, inputs: Floats, d: int, part: int, state: PlantState) -> Non
 def step_with_friction(
     A: Floats, inputs: Floats, d: int, part: int, level: float, count: int, state: PlantState
 ) -> None:
-    """Take several substeps under one Coulomb friction and a constant force.
+    """Take several substeps under one Coulomb friction and a constant force, which `held_increment` has.
 
+    A, inputs  `PlantArrays.transition`, `inputs`;   level  of the friction [N];   count  substeps
     The very numbers of `predict_motions`, `solve_forces` and `step`, without asking each time what there is; in so
     short a loop that costs more than the algebra.
     """
     N, held, here, there = A.shape[3], state.held_increment, state.states, state.next_states
+    # rows N and N + 1 are place and speed of the friction's motion
     speed, mobility, force = N + 1, inputs[d, part, 2, N + 1], 0.0
     for _ in range(count):
         w = held[speed]
@@ -168,7 +176,7 @@ def step_with_frictions(
     set_held_increment(inputs, d, part, command, push, state.held_increment)
     if E == 1:
         if count > 0:
-            step_with_friction(A, inputs, d, part, devices.numbers[d, 0, 0], count, state)
+            step_with_friction(A, inputs, d, part, devices.numbers[d, 0, COULOMB_LEVEL], count, state)
         return
     here = state
     for _ in range(count):
@@ -177,7 +185,7 @@ def step_with_frictions(
             solve_forces(devices, d, part, True, here)
         step(A, inputs, d, part, here)
         here = swapped(here)
-    # states alternate between two arrays, and are left in the other one
+    # states alternate between two arrays; after an odd number of substeps they are in the other one
     if count % 2:
         keep_swapped(state)
 
@@ -197,32 +205,34 @@ def keep_swapped(state: PlantState) -> None:
 
 @compiled_inline
 def solve_forces(devices: PlantArrays, d: int, part: int, coulomb: bool, state: PlantState) -> None:
-    """The forces of the elements; those that move one another settle by Gauss-Seidel.
+    """Fill in the forces of the elements; those that move one another settle by Gauss-Seidel.
 
-    coulomb  whether all are Coulomb frictions; written as True in a call, the code of the others is left out
+    coulomb  True: all are Coulomb frictions; where a call says so, the code of the other kinds is not compiled
     """
     forces, E = state.forces, state.forces.size
     if E == 1:
-        forces[0] = _force(devices, d, part, 0, coulomb, state)
+        forces[0] = _element_force(devices, d, part, 0, coulomb, state)
     else:
         for e in range(E):
             forces[e] = 0.0
         for _ in range(SWEEPS):
             change, largest = 0.0, 0.0
             for e in range(E):
-                f = _force(devices, d, part, e, coulomb, state)
-                change, largest = max(change, abs(f - forces[e])), max(largest, abs(f))
-                forces[e] = f
+                force = _element_force(devices, d, part, e, coulomb, state)
+                change, largest = max(change, abs(force - forces[e])), max(largest, abs(force))
+                forces[e] = force
             if change <= SETTLED * largest:
                 break
     for e in range(E):
         if not coulomb and devices.kind[d, e] == BRISTLES:
-            _bend(devices, d, part, e, state)
+            _bend_bristles(devices, d, part, e, state)
 
 
 @compiled_inline
-def _ahead(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> tuple[float, float]:
-    """Place and speed of motion e after the substep under the forces of all other elements."""
+def _motion_without_own_force(
+    devices: PlantArrays, d: int, part: int, e: int, state: PlantState
+) -> tuple[float, float]:
+    """Place and speed of element e's motion after the substep under the forces of all other elements."""
     at, inputs = devices.energy.shape[1] + 2 * e, devices.inputs
     place, speed = state.next_states[at], state.next_states[at + 1]
     for k in range(state.forces.size):
@@ -233,10 +243,10 @@ def _ahead(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -
 
 
 @compiled_inline
-def _force(devices: PlantArrays, d: int, part: int, e: int, coulomb: bool, state: PlantState) -> float:
+def _element_force(devices: PlantArrays, d: int, part: int, e: int, coulomb: bool, state: PlantState) -> float:
     """The force of element e under those of all others."""
     at, inputs = devices.energy.shape[1] + 2 * e, devices.inputs
-    place, speed = _ahead(devices, d, part, e, state)
+    place, speed = _motion_without_own_force(devices, d, part, e, state)
     return element_force(
         COULOMB if coulomb else devices.kind[d, e],
         devices.numbers,
@@ -254,10 +264,10 @@ def _force(devices: PlantArrays, d: int, part: int, e: int, coulomb: bool, state
 
 
 @compiled_inline
-def _bend(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> None:
-    """Let the bristles of element e bend."""
+def _bend_bristles(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> None:
+    """Let the bristles of element e bend over the substep, under the forces that were solved for."""
     at = devices.energy.shape[1] + 2 * e
-    _, speed = _ahead(devices, d, part, e, state)
+    _, speed = _motion_without_own_force(devices, d, part, e, state)
     mobility, h = devices.inputs[d, part, 2 + e, at + 1], devices.length[d, part]
     bristles_bend(devices.numbers, state.memory, d, e, state.states[at + 1], speed, mobility, h)
 
@@ -268,6 +278,16 @@ BRISTLES: Final = 1
 SPRING: Final = 2
 VARYING: Final = 3
 SAMPLED: Final = 4  # a force of the computer beside the wall's, which stands in the memory
+# Of an element that varies: columns of its numbers (BRAKE_.. of a brake alone), and of its memory (E, 4).
+ROLE, BRAKE_DAMPING, BRAKE_LAG = range(3)
+MEAN_STIFFNESS, MEAN_DAMPING, REST, ONSET = range(4)
+BRAKE_COMMANDED, BRAKE_AFTER = 2, 3
+# Of a sampled force: columns of its numbers (1 where it is filtered; the actuator's lag [s]), and of its memory.
+FILTERED, ACTUATOR_LAG = range(2)
+MEAN_FORCE, END_FORCE = range(2)
+BRISTLE_DEFLECTION: Final = 0  # column of the memory of bristles
+COULOMB_LEVEL: Final = 0  # column of the numbers of a Coulomb friction
+KINK: Final = 5  # column of the numbers of a bent spring, behind its law
 
 
 @compiled_inline
@@ -285,19 +305,26 @@ def element_force(
     mobility: float,
     h: float,
 ) -> float:
-    """Mean force of element e over a substep of length h [s], with its numbers (D, E, 6) and memory (E, 4)."""
+    """Mean force [N] of element e of device d over a substep of length h [s].
+
+    numbers  (D, E, 6)  COULOMB: level [N];   BRISTLES: as of `bristle_force`;   SPRING: law and kink, as of
+             `bent_spring_force`;   VARYING: ROLE to BRAKE_LAG;   SAMPLED: FILTERED and ACTUATOR_LAG
+    memory   (E, 4)     BRISTLES: BRISTLE_DEFLECTION;   VARYING: MEAN_STIFFNESS to ONSET;   SAMPLED: MEAN_FORCE
+    q0, v0, q1, v1, shift, mobility  of its motion, see the module
+    """
     if kind == COULOMB:
-        return coulomb_force(numbers[d, e, 0], v0, v1, mobility)
+        return coulomb_force(numbers[d, e, COULOMB_LEVEL], v0, v1, mobility)
     if kind == BRISTLES:
         law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
-        return bristle_force(memory[e, 0], law, v0, v1, mobility, h)[0]
+        return bristle_force(memory[e, BRISTLE_DEFLECTION], law, v0, v1, mobility, h)[0]
     if kind == SPRING:
         law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
-        return bent_spring_force(law, numbers[d, e, 5], q0, q1, shift)
+        return bent_spring_force(law, numbers[d, e, KINK], q0, q1, shift)
     if kind == SAMPLED:
-        return float(memory[e, 0])
+        return float(memory[e, MEAN_FORCE])
     if kind == VARYING:
-        return varying_force(memory[e, 0], memory[e, 1], memory[e, 2], q0, q1, shift, h)
+        # of a brake the column REST holds its commanded damping, without effect as the stiffness is 0
+        return varying_force(memory[e, MEAN_STIFFNESS], memory[e, MEAN_DAMPING], memory[e, REST], q0, q1, shift, h)
     return 0.0
 
 
@@ -305,9 +332,9 @@ def element_force(
 def bristles_bend(
     numbers: Floats, memory: Floats, d: int, e: int, v0: float, v1: float, mobility: float, h: float
 ) -> None:
-    """Let the bristles of element e bend as the substep ends; its force itself remembers nothing."""
+    """Let the bristles of element e bend as the substep ends; `element_force` itself changes no memory."""
     law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
-    memory[e, 0] = bristle_force(memory[e, 0], law, v0, v1, mobility, h)[1]
+    memory[e, BRISTLE_DEFLECTION] = bristle_force(memory[e, BRISTLE_DEFLECTION], law, v0, v1, mobility, h)[1]
 
 
 @compiled_lean
@@ -318,27 +345,29 @@ def bent_spring_force(
 
         V(q) = U(a + q) - F q - k q^2/2,    U(d) = cubic d^4/4 + excess min(d - kink, 0)^2/2
 
-    law  cubic, excess, the offset a at which it is bent already, and U's slope F and its tangent k there, which
-         are in the equilibrium and in the linear plant
+    law   cubic [N/m³], excess [N/m], the offset a [m] at which it is bent already, and U's slope F [N] and its
+          tangent k [N/m] there, which are in the equilibrium and in the linear plant
+    kink  deflection below which the excess acts [m];   q0, q1, shift  see the module
 
-    By Newton's method on f = F(q1 + shift f), the difference quotient written out so that q1 = q0 is no case.
+    By Newton's method on f = -mean(q1 + shift f), `mean` the difference quotient of V, written out so that q1 = q0
+    is no special case.
     """
     cubic, excess, offset, held, tangent = law
-    f = 0.0
+    force = 0.0
     for _ in range(25):
-        end = q1 + shift * f
-        mean, slope = _quotient(cubic, excess, kink, offset + q0, offset + end)
+        end = q1 + shift * force
+        mean, slope = _difference_quotient(cubic, excess, kink, offset + q0, offset + end)
         mean, slope = mean - held - 0.5 * tangent * (q0 + end), slope - 0.5 * tangent
-        step = (f + mean) / (1.0 + shift * slope)
-        f -= step
-        if abs(step) <= 1e-15 * (abs(f) + abs(mean)):
+        step = (force + mean) / (1.0 + shift * slope)
+        force -= step
+        if abs(step) <= 1e-15 * (abs(force) + abs(mean)):
             break
-    return f
+    return force
 
 
 @compiled_lean
-def _quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) -> tuple[float, float]:
-    """(U(q1) - U(q0))/(q1 - q0) with U as in `bent_spring_force` [N], and about its slope in q1 [N/m]."""
+def _difference_quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) -> tuple[float, float]:
+    """(U(q1) - U(q0))/(q1 - q0) with U as in `bent_spring_force` [N], and its derivative by q1, roughly [N/m]."""
     mean = 0.25 * cubic * (q1 * q1 + q0 * q0) * (q1 + q0)
     slope = 0.25 * cubic * (3.0 * q1 * q1 + 2.0 * q1 * q0 + q0 * q0)
     q0, q1 = q0 - kink, q1 - kink
@@ -357,23 +386,28 @@ def _quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) ->
 def varying_force(
     stiffness: float, damping: float, rest: float, q0: float, q1: float, shift: float, h: float
 ) -> float:
-    """A spring and a damper whose numbers change from sample to sample:  -(k (q_mean - rest) + b (q1 - q0)/h).
+    """A spring and a damper whose numbers change from sample to sample:  -(k (q_mean - rest) + b (q1 - q0)/h) [N].
+
+    q0, q1, shift  see the module;   h  length of the substep [s]
 
     Implicit, so that no number is too large for the substep; the damper never gives energy.
     """
+    # the force moves q1 by shift times itself, and the mean by half of that: hence the divisor
     pull = stiffness * (0.5 * (q0 + q1) - rest) + damping * (q1 - q0) / h
     return -pull / (1.0 + shift * (0.5 * stiffness + damping / h))
 
 
 @compiled_inline
 def coulomb_force(level: float, v0: float, w: float, mobility: float) -> float:
-    """Coulomb friction with sticking, as the impulse that the substep's velocities ask for.
+    """Coulomb friction with sticking: its mean force [N] over a substep.
+
+    level  C [N];   v0, w, mobility  velocities at the beginning and, without it, at the end [m/s], see the module
 
     As long as the motion slides, the force is -C sign(v). Where that would turn it round, it stops within the
     substep; what pushes it then either cannot overcome C, and it ends the substep at rest, or drags it on the
     other way for the rest of the substep. The velocity at the end is then right to second order in the substep.
     """
-    brake = level * mobility
+    brake = level * mobility  # velocity that C takes away in a whole substep
     side = 1.0
     if v0 < 0.0 or (v0 == 0.0 and w < 0.0):
         side, v0, w = -1.0, -v0, -w
@@ -382,7 +416,7 @@ def coulomb_force(level: float, v0: float, w: float, mobility: float) -> float:
     push = w - v0  # what it gains over a whole substep, nearly evenly
     if push >= -brake:
         return -side * w / mobility
-    slid = v0 / (v0 - w + brake)
+    slid = v0 / (v0 - w + brake)  # share of the substep until it stops
     return side * ((push + brake) * (1.0 - slid) - w) / mobility
 
 
@@ -397,9 +431,12 @@ def stribeck(coulomb: float, breakaway: float, stribeck_velocity: float, v: floa
 
 @compiled_lean
 def bristles_after(z: float, level: float, stiffness: float, v: float, h: float) -> tuple[float, float]:
-    """Deflection after h at constant velocity, and its mean:  z' = v - sigma_0 |v| z / g  in closed form."""
+    """Deflection of bristles after h [s] at constant velocity v [m/s], and its mean over h [m].
+
+    Of z' = v - sigma_0 |v| z/g in closed form.   z  now [m];   level, stiffness  g [N], sigma_0 [N/m]
+    """
     rate = stiffness * abs(v) / level * h
-    if rate < 1e-8:
+    if rate < 1e-8:  # so short a way bends them as it goes
         return z + v * h, z + 0.5 * v * h
     full = level / stiffness if v > 0.0 else -level / stiffness
     fade = exp(-rate)
@@ -415,9 +452,11 @@ def bristle_force(
     mobility: float,
     h: float,
 ) -> tuple[float, float]:
-    """Force of the Dahl and LuGre models over the substep, and the bristles' deflection after it.
+    """Force of the Dahl and LuGre models over the substep [N], and the bristles' deflection after it [m].
 
-    numbers  C, F_s, v_s, sigma_0, sigma_1; Dahl's model is the one with F_s = C and sigma_1 = 0
+    z        deflection now [m];   v0, w, mobility  see the module;   h  length of the substep [s]
+    numbers  C [N], F_s [N], v_s [m/s], sigma_0 [N/m], sigma_1 [N s/m]; Dahl's model has F_s = C and
+             sigma_1 = 0
 
     The force f and the mean velocity u = (v0 + w + mobility f)/2 follow from each other. Solved for u by false
     position (Illinois), between velocities at which the friction would be none and twice its most.
@@ -429,7 +468,7 @@ def bristle_force(
     free = 0.5 * (v0 + w)
 
     low, high = free, free
-    low_gap = high_gap = _gap(z, numbers, free, free, mobility, h)
+    low_gap = high_gap = _velocity_gap(z, numbers, free, free, mobility, h)
     # the friction changes the velocity by no more than mobility times its largest force: the root is bracketed by
     # steps of that size
     reach = mobility * most
@@ -438,34 +477,34 @@ def bristle_force(
             break
         if high_gap < 0.0:
             high = high + reach
-            high_gap = _gap(z, numbers, free, high, mobility, h)
+            high_gap = _velocity_gap(z, numbers, free, high, mobility, h)
         else:
             low = low - reach
-            low_gap = _gap(z, numbers, free, low, mobility, h)
+            low_gap = _velocity_gap(z, numbers, free, low, mobility, h)
         reach *= 2.0
-    u, last = free, 0
+    u, last_moved = free, 0  # 1: the upper end, -1: the lower one
     for _ in range(100):
         if high_gap == low_gap or high - low <= 1e-15 * (abs(high) + abs(low)):
             break
         u = high - high_gap * (high - low) / (high_gap - low_gap)
-        gap = _gap(z, numbers, free, u, mobility, h)
+        gap = _velocity_gap(z, numbers, free, u, mobility, h)
         if abs(gap) <= 1e-14 * (abs(free) + mobility * most):
             break
         # Illinois: the value at an end that stays twice is halved, else false position creeps from one side
         if gap > 0.0:
             high, high_gap = u, gap
-            low_gap *= 0.5 if last == 1 else 1.0
-            last = 1
+            low_gap *= 0.5 if last_moved == 1 else 1.0
+            last_moved = 1
         else:
             low, low_gap = u, gap
-            high_gap *= 0.5 if last == -1 else 1.0
-            last = -1
+            high_gap *= 0.5 if last_moved == -1 else 1.0
+            last_moved = -1
     after, mean = bristles_after(z, stribeck(coulomb, breakaway, slow, u), stiffness, u, h)
     return -(stiffness * mean + damping * (after - z) / h), after
 
 
 @compiled_lean
-def _gap(
+def _velocity_gap(
     z: float,
     numbers: tuple[float, float, float, float, float],
     free: float,
@@ -473,7 +512,10 @@ def _gap(
     mobility: float,
     h: float,
 ) -> float:
-    """By how much the mean velocity u differs from what the friction at u leaves of the free one [m/s]."""
+    """By how much a mean velocity u differs from what the friction at u leaves of the free one [m/s].
+
+    free  mean velocity without friction, (v0 + w)/2 [m/s];   z, numbers, mobility, h  as of `bristle_force`
+    """
     coulomb, breakaway, slow, stiffness, damping = numbers
     after, mean = bristles_after(z, stribeck(coulomb, breakaway, slow, u), stiffness, u, h)
     return u - free + 0.5 * mobility * (stiffness * mean + damping * (after - z) / h)

@@ -205,13 +205,17 @@ def _length_and_responses(
     controlled: bool,
     seconds_to_hear: Callable[[float], float] | None,
 ) -> tuple[RunLength, list[TimeResponse]]:
-    """Simulate for the requested duration [s], or for one that shows the motion; return it with the responses."""
+    """Simulate for the requested duration [s], or for one that shows the motion; return length and responses.
+
+    simulate    `simulate_batch` of all runs, called with duration [s]
+    controlled  whether a passivity controller acts
+    """
     if duration is not None:
         length = RunLength(duration, "as requested")
         return length, simulate(duration=duration)
     loop, hand = contact.run.loop, contact.run.hand
     length = contact_run_length(loop, hand, contact.growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
-    return _long_enough(simulate, length, loop.period, seconds_to_hear)
+    return _responses_to_hear(simulate, length, loop.period, seconds_to_hear)
 
 
 def _judgement(contact: _Contact, response: TimeResponse) -> Judgement:
@@ -242,12 +246,12 @@ def _chosen_environment(
 ) -> tuple[str | Environment, Mapping[str, float]]:
     """Choose what is touched, under load the wall that holds the load; return it with its parameters by name.
 
-    Raises  ArgumentError  as `_under_load` and `_wall_or` do
+    Raises  ArgumentError  as `_under_load` and `_environment_or_wall` do
     """
     if point.load is not None:
         wall, environment, parameters = _under_load(point, wall, environment, parameters)
     has_stiffness = stiffness is not None or "stiffness" in parameters
-    return _wall_or(environment, wall, has_stiffness=has_stiffness), parameters
+    return _environment_or_wall(environment, wall, has_stiffness=has_stiffness), parameters
 
 
 def _start_and_distance(
@@ -270,13 +274,17 @@ def _is_disturbed(response: TimeResponse) -> bool:
     return bool(np.ptp(response.truth) > 0.0 or np.any(response.force))
 
 
-def _long_enough(
+def _responses_to_hear(
     simulate: Callable[..., list[TimeResponse]],
     length: RunLength,
     period: float,
     seconds_to_hear: Callable[[float], float] | None,
 ) -> tuple[RunLength, list[TimeResponse]]:
-    """The responses; simulated again, longer, where the frequency that comes out takes that to be heard."""
+    """Simulate for a length, and again for longer where the frequency that comes out takes that to be heard.
+
+    simulate, seconds_to_hear  as in `_length_and_responses` and `simulate_contact`;   period  T [s]
+    Returns  the length that was kept, and its responses
+    """
     responses = simulate(duration=length.seconds)
     if seconds_to_hear is None or responses[0].given_up:
         return length, responses
@@ -286,7 +294,7 @@ def _long_enough(
 
 def range_exit(point: OperatingPoint, response: TimeResponse) -> RangeExit | None:
     """Find where a motion leaves the handle's range, which is computed only if an extreme of the motion cannot be
-    reached."""
+    reached; None where it stays within."""
     handle = response.handle
     try:
         for extreme in (handle.min(), handle.max()):
@@ -304,7 +312,9 @@ def _under_load(
     environment: str | Environment | None,
     parameters: Mapping[str, float],
 ) -> tuple[WallSides, str | Environment | None, Mapping[str, float]]:
-    """The wall under load: the one-sided one is that on which the hand leans; parameters with its load.
+    """The wall under load: the two-sided one as it is, the one-sided one as that on which the hand leans.
+
+    Returns  the wall's sides, the environment (None: the two-sided wall), and the parameters, with the load
 
     Raises  ArgumentError  for anything but a wall, on which no hand leans
     """
@@ -318,8 +328,10 @@ def _under_load(
     return "two-sided", ENVIRONMENTS["pressed_wall"], {"load": load, **parameters}
 
 
-def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stiffness: bool) -> str | Environment:
-    """The other environment, or the wall that acts on these sides.
+def _environment_or_wall(
+    environment: str | Environment | None, wall: WallSides, *, has_stiffness: bool
+) -> str | Environment:
+    """The environment, or for None the wall that acts on these sides.
 
     Raises  ArgumentError  where both are given, or the wall has no stiffness
     """
@@ -327,8 +339,8 @@ def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stif
         raise ArgumentError("wall", "is one-sided beside another environment; leave one out")
     if environment is None and not has_stiffness:
         raise ArgumentError("stiffness", "is missing; a wall needs one [N/m]")
-    own = ENVIRONMENTS["one_sided_wall" if wall == "one-sided" else "wall"]
-    return own if environment is None else environment
+    chosen_wall = ENVIRONMENTS["one_sided_wall" if wall == "one-sided" else "wall"]
+    return chosen_wall if environment is None else environment
 
 
 def _distance_from_path(point: OperatingPoint, position: float, argument: str) -> float | None:
@@ -396,7 +408,7 @@ def environment_with_values(
 
 
 def _environment(environment: str | Environment) -> Environment:
-    """The environment itself, or the one of this name or file. Raises ArgumentError."""
+    """The environment itself, or the one of this name or file; see `environment_with_values`."""
     if isinstance(environment, Environment):
         return environment
     check_kind("environment", environment, str)
@@ -415,7 +427,10 @@ def active_hand(
     reach: Reach | None,
     reflex: Reflex | None,
 ) -> Hand:
-    """The operator with what he does; `surface` says whether there is one to push against.
+    """The operator (None: nobody) with his movements.
+
+    surface  True: there is one to push against, so that push None means PUSH unless he reaches; False: it means 0
+    The others are those of `simulate_contact`
 
     Raises  ArgumentError  for what needs an arm, or a push
     """

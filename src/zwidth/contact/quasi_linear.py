@@ -16,6 +16,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.contact.engine_inputs import LinearDynamics, dynamics
 from zwidth.contact.vibration_kernel import (
+    AMPLITUDE,
     FORCE,
     VELOCITIES,
     LoopArrays,
@@ -70,7 +71,9 @@ def friction_velocity_of(swing: Vibration) -> float:
 class EquivalentLoop:
     """A loop with a wall, in the form in which its vibrations of any amplitude are computed.
 
-    offset  middle of the vibration, as a share of each counter's step;   limit  largest force [N]
+    parts   what of the plant depends on the amplitude;   limit  largest force [N]
+    offset  middle of the vibration, as a share of each counter's step
+    filter, estimator  of the force and of the velocity, as state-space forms
     """
 
     loop: Loop
@@ -97,7 +100,7 @@ class EquivalentLoop:
 
     def seed(self, amplitude: float, angle: float) -> Vibration:
         """A vibration at an angle per sample [rad], all moving like the sensor, to start an iteration from."""
-        w, parts = angle / self.loop.period, self.parts
+        w, parts = angle / self.loop.period, self.parts  # w: angular frequency [rad/s]
         return Vibration(
             complex(np.exp(1j * angle)),
             amplitude,
@@ -108,44 +111,50 @@ class EquivalentLoop:
         )
 
     def first_guess(self, amplitude: float) -> Vibration:
-        """A vibration of the linear loop to start from."""
+        """The fastest growing vibration of the linear loop, of this amplitude [m]; a seed where nothing swings."""
         guess = self.seed(amplitude, 0.2 * np.pi)
-        roots, sizes = vibrations(self._arrays, self._unbent, amplitude, False)
+        roots, sizes = vibrations(self._arrays, self._linear_sizes, amplitude, False)
         swings = [self._swing(*root_and_size) for root_and_size in zip(roots, sizes, strict=True)]
         return max(swings, key=lambda other: abs(other.root), default=guess)
 
     @property
-    def _unbent(self) -> Floats:
-        """Sizes at which every part acts as in the linear loop: no friction, no steps, no limit."""
+    def _linear_sizes(self) -> Floats:
+        """Sizes (see `_sizes`) at which each part acts as in the linear loop: no friction, steps or limit."""
         parts = self.parts
+        # velocities and readings without bound, force and deflections 0
         sizes = np.zeros(VELOCITIES + len(parts.friction) + len(parts.counters) + len(parts.springs))
         sizes[VELOCITIES : len(sizes) - len(parts.springs)] = np.inf
         return sizes
 
     def _swing(self, root: complex, sizes: Floats) -> Vibration:
-        """A vibration from its row of sizes."""
+        """A vibration from its root and row of sizes (see `_sizes`)."""
         f, c = len(self.parts.friction), len(self.parts.counters)
         velocities, readings, deflections = np.split(sizes[VELOCITIES:], [f, f + c])
-        return Vibration(complex(root), float(sizes[0]), float(sizes[FORCE]), velocities, readings, deflections)
+        return Vibration(
+            complex(root), float(sizes[AMPLITUDE]), float(sizes[FORCE]), velocities, readings, deflections
+        )
 
     def open_at_limit(self) -> tuple[Floats, Floats, Floats]:
         """The linear loop cut at the limit of its force: transition (M, M) without the force, what a force of 1 N
         adds (M,), and the commanded force, (M,)."""
-        steps = plant_steps(self._arrays, self._unbent)
-        closed, _, command = transition(self._arrays, self._unbent, 1.0, *steps)
-        cut, _, _ = transition(self._arrays, self._unbent, 0.0, *steps)
+        steps = plant_steps(self._arrays, self._linear_sizes)
+        closed, _, command = transition(self._arrays, self._linear_sizes, 1.0, *steps)
+        cut, _, _ = transition(self._arrays, self._linear_sizes, 0.0, *steps)
+        # closed = cut + added command^T, of which `added` is what 1 N adds
         return cut, (closed - cut) @ command / (command @ command), command
 
     @cached_property
     def _arrays(self) -> LoopArrays:
         """The loop and the wall as the compiled part takes them."""
-        T, n, own, parts = self.loop.period, self.dynamics.size, self.dynamics, self.parts
-        scale = _scales(own.generator, n, T)
+        T, n, linear, parts = self.loop.period, self.dynamics.size, self.dynamics, self.parts
+        scale = _scales(linear.generator, n, T)
         groups = (parts.friction, parts.counters, parts.springs)
-        inputs = own.inputs * scale[:, None] * T
-        along = [np.array([part.along for part in group], dtype=float).reshape(-1, n) for group in groups]
+        inputs = linear.inputs * scale[:, None] * T
+        friction_motions, counter_motions, spring_motions = (
+            np.array([part.along for part in group], dtype=float).reshape(-1, n) for group in groups
+        )
         return LoopArrays(
-            generator=own.generator * scale[:, None] / scale * T,
+            generator=linear.generator * scale[:, None] / scale * T,
             drive=inputs[:, 0].copy(),
             coordinates=n,
             period=T,
@@ -156,13 +165,13 @@ class EquivalentLoop:
             limit=float(self.limit),
             sensor=np.array(self.loop.plant.sensor, dtype=float),
             force_inputs=inputs[:, 1:].copy(),
-            friction_motions=along[0],
+            friction_motions=friction_motions,
             coulomb=np.array([part.coulomb for part in parts.friction], dtype=float),
-            spring_motions=along[2],
+            spring_motions=spring_motions,
             cubic=np.array([part.cubic for part in parts.springs], dtype=float),
             excess=np.array([part.backward_excess for part in parts.springs], dtype=float),
             kink=np.array([part.kink for part in parts.springs], dtype=float),
-            counter_motions=along[1],
+            counter_motions=counter_motions,
             weight=np.array([part.weight for part in parts.counters], dtype=float),
             step=np.array([part.step for part in parts.counters], dtype=float),
             offset=float(self.offset),
@@ -178,8 +187,11 @@ class EquivalentLoop:
 
 
 def _scales(generator: Floats, n: int, period: float) -> Floats:
-    """Units of the states: velocities in metres per sample, lagged dampers' forces such that both couplings are of
-    one size, so that an exponential keeps its digits."""
+    """Factors (N,) by which states are scaled: velocities to metres per sample, lagged dampers' forces such that
+    both couplings are of one size, so that an exponential keeps its digits.
+
+    generator  (N, N)  of n positions, n velocities and other states
+    """
     scale = np.ones(len(generator))
     scale[n : 2 * n] = period
     for k in range(2 * n, len(generator)):
@@ -218,7 +230,7 @@ def equivalent_loop(
     parts = replace(parts, friction=friction, counters=counters, brakes=(), force_limit=force_limit)
     motions = [part.along for part in friction] + [spring.along for spring in parts.springs]
     along = np.array(motions, dtype=float).reshape(len(motions), loop.plant.size)
-    own = dynamics(loop.plant, loop.controller.actuator_time_constant, along)
+    linear = dynamics(loop.plant, loop.controller.actuator_time_constant, along)
     on_force, estimator = force_filter(loop.controller), loop.estimator
     return EquivalentLoop(
         loop,
@@ -227,7 +239,7 @@ def equivalent_loop(
         parts,
         force_limit,
         offset,
-        own,
+        linear,
         filter_states(on_force.numerator, on_force.denominator, np.ones(1)),
         filter_states(estimator.numerator, estimator.denominator, estimator.window),
     )

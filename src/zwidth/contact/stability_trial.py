@@ -95,13 +95,13 @@ class StabilityTrial:
 
     @property
     def smooth(self) -> bool:
-        """Whether nothing is nonlinear except the wall."""
+        """Whether nothing of the device is nonlinear; the wall and the hand may be."""
         linear_estimate = not isinstance(self.loop.controller.velocity, Foaw | Levant)
         return not self.loop.nonlinear and linear_estimate
 
     @property
     def linear(self) -> bool:
-        """Whether nothing is nonlinear."""
+        """Whether nothing of device, wall and hand is nonlinear."""
         return self.smooth and not self.one_sided and self.hand.reflex is None and self.hand.tremor is None
 
     @cached_property
@@ -110,8 +110,8 @@ class StabilityTrial:
         time so many that the last look takes all of it."""
         if self.watch_time is not None:
             return max(ceil(self.watch_time / self.loop.period / float(LONGER ** (LEVELS - 1))), LEAST_SAMPLES)
-        own = natural_frequencies(self.loop.plant)
-        slow = PERIODS / float(own[own > 0.0].min(initial=np.inf)) / self.loop.period
+        frequencies = natural_frequencies(self.loop.plant)
+        slow = PERIODS / float(frequencies[frequencies > 0.0].min(initial=np.inf)) / self.loop.period
         held = self.one_sided or self.hand.operator is not None
         return max(
             FIRST_SAMPLES,
@@ -122,8 +122,8 @@ class StabilityTrial:
     def linearised(self) -> StabilityTrial:
         """The same trial with the linear part of the device only, and a two-sided wall."""
         plain = replace(self.loop.plant, nonlinear=Nonlinear())
-        ahead = self.loop.controller.feedforward
-        smooth = None if ahead is None else replace(ahead, coulomb=0.0)
+        feedforward = self.loop.controller.feedforward
+        smooth = None if feedforward is None else replace(feedforward, coulomb=0.0)
         computer = replace(self.loop.controller, force_limit=float("inf"), feedforward=smooth)
         hand = replace(self.hand, push=0.0, reflex=None, tremor=None, reach=None)
         return replace(self, loop=Loop(plain, computer), hand=hand, one_sided=False, speed=0.0, visible=0.0)
@@ -163,10 +163,10 @@ def observe(trial: StabilityTrial, walls: ArrayLike, levels: int | None = None) 
     observations: list[Observation | None] = [None] * len(walls)
     for level in range(most):
         samples = trial.first_samples * LONGER**level
-        open_ones = [i for i, observation in enumerate(observations) if observation is None]
+        undecided = [i for i, observation in enumerate(observations) if observation is None]
         at_once = max(AT_ONCE // samples, 1)
-        for start in range(0, len(open_ones), at_once):
-            some = open_ones[start : start + at_once]
+        for start in range(0, len(undecided), at_once):
+            some = undecided[start : start + at_once]
             for i, response in zip(some, _responses(trial, walls[some], samples), strict=True):
                 judged = judge_response(response)
                 stable = _verdict(trial, response, judged, level, last=level + 1 == most)
@@ -198,6 +198,7 @@ def _responses(trial: StabilityTrial, walls: Floats, samples: int) -> list[TimeR
 
 def _bound(trial: StabilityTrial, stiffness: float) -> float:
     """Reading from the wall at which a run stops [m]: many times what the disturbance and the push move."""
+    # the push's deflection of the wall, and the way at the start's speed in 1024 samples
     pushed = abs(trial.hand.push) / max(abs(stiffness), 1e-300)
     thrown = abs(trial.speed) * 1024 * trial.loop.period
     return float(BOUND_FACTOR * (trial.disturbance + thrown) + 20.0 * pushed)
@@ -225,4 +226,5 @@ def _verdict(
         return True
     if not last:
         return None
+    # of a nonlinear device, a quarter of the run must shrink the motion visibly
     return bool(growth < 0.0) if trial.smooth else bool(growth * (len(response.time) // 4) < -STEADY)

@@ -106,7 +106,7 @@ class TimeResponse(Result):
 
     @classmethod
     def of(cls, plan: RunSettings, records: Records, i: int) -> TimeResponse:
-        """Run i of a batch, cut to the samples that were run."""
+        """Run i of a batch, whose settings are `plan`, cut to the samples that were run."""
         S = int(records.samples[i])
         traces, ledger = records.traces[i, :S], records.ledger[i, :S]
         fine = S * len(plan.offsets) if records.handle.shape[1] else 0
@@ -205,7 +205,7 @@ class Judgement:
 
     @property
     def stable(self) -> bool | None:
-        """Whether the motion decays inside the wall."""
+        """Whether the motion decays inside the wall; None where that is undecided."""
         if self.behaviour == "undecided":
             return None
         return self.behaviour in ("converged", "decaying", "drifting")
@@ -240,11 +240,12 @@ def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement
             judged, float("nan"), _half_peak_to_peak(response.handle), float("nan"), float(touching.mean())
         )
     third, last, half = slice(S // 2, S // 4 * 3), slice(S // 4 * 3, S), slice(S // 2, S)
-    d = np.diff(response.truth, n=2 if drifts else 1)
-    size = float(np.abs(d[np.isfinite(d)]).max(initial=0.0))
-    before, after = _rms(d[S // 2 : S // 4 * 3]), _rms(d[S // 4 * 3 :])
+    changes = np.diff(response.truth, n=2 if drifts else 1)
+    size = float(np.abs(changes[np.isfinite(changes)]).max(initial=0.0))
+    before, after = _rms(changes[S // 2 : S // 4 * 3]), _rms(changes[S // 4 * 3 :])
+    # size of changes that counts as rest
     floor = max(QUIET * size, 1e-300)
-    if drifts:  # far away the changes of d are rounding of the position
+    if drifts:  # far away, second differences are rounding of the position
         floor = max(floor, DIGITS * float(np.abs(response.truth[np.isfinite(response.truth)]).max(initial=0.0)))
     moving = after > floor or (response.given_up and not drifts)
     growth = float(np.log(after / before)) if moving and before > 0.0 else float("nan")
@@ -291,7 +292,7 @@ def _behaviour(
 
 
 def _at_rest(response: TimeResponse, last: slice) -> bool:
-    """Whether the remaining motion is smaller than what the encoders resolve."""
+    """Whether the motion in the quarter `last` is smaller than what the encoders resolve."""
     swing = _half_peak_to_peak(response.truth[last])
     if response.noise > 0.0:
         return swing < 0.5 * response.quantum + 3.0 * response.noise
@@ -299,7 +300,7 @@ def _at_rest(response: TimeResponse, last: slice) -> bool:
 
 
 def _rms(signal: Floats) -> float:
-    """Root mean square under a Hann window."""
+    """Root mean square under a Hann window, in the signal's unit; inf or nan where the largest value is that."""
     weight, size = np.hanning(len(signal) + 2)[1:-1], float(np.abs(signal).max(initial=0.0))
     if not 0.0 < size < np.inf:
         return size
@@ -323,15 +324,15 @@ def dominant_frequency(signal: Floats, period: float) -> float:
     k = len(signal)
     if k < FEWEST or not np.all(np.isfinite(signal)):
         return float("nan")
-    j = np.arange(k) - (k - 1) / 2.0
-    straight = signal.mean() + j * (j @ signal) / (j @ j)
-    rest = (signal - straight) * np.hanning(k)
-    size = float(np.abs(rest).max())
+    samples = np.arange(k) - (k - 1) / 2.0  # from the middle
+    straight = signal.mean() + samples * (samples @ signal) / (samples @ samples)
+    windowed = (signal - straight) * np.hanning(k)
+    size = float(np.abs(windowed).max())
     if not size > 0.0:
         return float("nan")
-    spectrum = np.abs(np.fft.rfft(rest / size, 4 * k))
-    at = int(np.argmax(spectrum[1:-1])) + 1
-    a, b, c = np.log(np.maximum(spectrum[at - 1 : at + 2], 1e-300))
-    bend = a - 2.0 * b + c
-    shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
-    return float((at + np.clip(shift, -0.5, 0.5)) / (4 * k * period))
+    spectrum = np.abs(np.fft.rfft(windowed / size, 4 * k))  # four times as fine as the length gives
+    peak = int(np.argmax(spectrum[1:-1])) + 1
+    before, at, after = np.log(np.maximum(spectrum[peak - 1 : peak + 2], 1e-300))
+    bend = before - 2.0 * at + after
+    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    return float((peak + np.clip(shift, -0.5, 0.5)) / (4 * k * period))

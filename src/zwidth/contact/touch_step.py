@@ -80,6 +80,8 @@ HANDLE_VELOCITY, ENERGY = TRACES, TRACES + 1
 OUTPUTS: Final = TRACES + 2
 FIRST_OUTPUT: Final = 6
 DRAWN: Final = FIRST_OUTPUT + OUTPUTS
+# Places in `memory`.
+PERIODS_GONE, FIRST_READING = range(2)
 # Wall laws.
 FREE, TWO_SIDED, ONE_SIDED = range(3)
 STATES_AT: Final = 2  # where in `memory` the states begin
@@ -114,6 +116,7 @@ def wall_force(law: int, stiffness: float, damping: float, position: float, velo
 def touch_step(touch: Touch, ports: Floats, push: float, drawn: Floats, outputs: Floats, row: int) -> None:
     """One sampling period: read, estimate, render, filter, limit, send, and move under a constant push [N].
 
+    ports    LAW to WALL are read
     drawn    (1, C)        noise of each encoder's position, drawn already
     outputs  (., OUTPUTS)  the row is written with what is so at the sample; the states are those at its end
     """
@@ -136,11 +139,11 @@ def touch_step(touch: Touch, ports: Floats, push: float, drawn: Floats, outputs:
 
 @compiled_inline
 def touch_of(counts: Ints, numbers: Floats, memory: Floats) -> Touch:
-    """The device in its blocks; what no period of this kind looks at is empty."""
+    """The device as views of its blocks, see the module; what no period of this kind looks at is empty."""
     n, N, E, P, C = counts[SIZE], counts[STATES], counts[ELEMENTS], counts[PARTS], counts[ENCODERS]
     w, k, f, delay = counts[WEIGHTS], counts[FACTORS], counts[FILTERS], counts[DELAY]
     R, F = N + 2 * E, 2 + E
-    at = 2
+    at = 2  # behind period and limit
     transition = view(numbers, at, (1, P, R, N))
     at += P * R * N
     inputs = view(numbers, at, (1, P, F, R))
@@ -207,13 +210,13 @@ def touch_of(counts: Ints, numbers: Floats, memory: Floats) -> Touch:
         view(memory, 0, (0, 0)),
         view(memory, STATES_AT + 2 * R, (R,)),
     )
-    signals = Signals(view(memory, 1, (1,)), past, stages, filtered, queue)
-    return Touch(devices, computer, signals, state, view(memory, 0, (1,)))
+    signals = Signals(view(memory, FIRST_READING, (1,)), past, stages, filtered, queue)
+    return Touch(devices, computer, signals, state, view(memory, PERIODS_GONE, (1,)))
 
 
 @compiled_lean
 def touch(counts: Ints, numbers: Floats, memory: Floats, ports: Floats) -> None:
-    """One sampling period with what stands in the ports, where what comes out is written, too."""
+    """One sampling period with what stands in the ports (see the module), where what comes out is written, too."""
     device, inputs = touch_of(counts, numbers, memory), view(ports, 0, (DRAWN,))
     outputs, drawn = view(ports, FIRST_OUTPUT, (1, OUTPUTS)), view(ports, DRAWN, (counts[ENCODERS],))
     touch_step(device, inputs, inputs[PUSH], drawn, outputs, 0)

@@ -33,8 +33,8 @@ ROUNDS: Final = 4  # times that a faster vibration of the loop so found is follo
 PARTS: Final = 4  # of a sampling interval, over which the mean square of a velocity is taken (Simpson's rule)
 STOPPED: Final = 1e9  # part of a motion left after a sample is exp(-this): a stronger damper does the same
 LEAST: Final = 1e-300  # a size that gains are taken at instead of 0
-FORCE: Final = 1  # place of the force among the sizes; the amplitude is at 0
-VELOCITIES: Final = 2  # and where the velocities begin
+# Among the sizes: places of the amplitude and of the force, and where the velocities begin.
+AMPLITUDE, FORCE, VELOCITIES = range(3)
 
 
 class LoopArrays(NamedTuple):
@@ -86,29 +86,35 @@ class LoopArrays(NamedTuple):
 
 @compiled
 def held_vibration_response(A: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:
-    """exp(A share) (N, N), and the states (N,) that a unit input through b (N,) leaves, held over that share."""
-    N, size = len(A), 0.0
+    """exp(A share) (N, N), and the states (N,) that a unit input through b (N,) leaves, held over that share.
+
+    share  of a sample, in whose unit the generator A (N, N) is
+    """
+    N, size = len(A), 0.0  # size: the largest row sum of |A| share
     for i in range(N):
         row = 0.0
         for j in range(N):
             row += abs(A[i, j]) * share
         size = max(size, row)
-    E, G, gain = np.zeros((N, N)), np.zeros((N, N)), np.zeros(N)
-    exponential(A, share, size, E, G, np.zeros((3, N, N)))
+    grown, integral, gain = np.zeros((N, N)), np.zeros((N, N)), np.zeros(N)
+    exponential(A, share, size, grown, integral, np.zeros((3, N, N)))
     for i in range(N):
         for j in range(N):
-            gain[i] += G[i, j] * b[j]
-    return E, gain
+            gain[i] += integral[i, j] * b[j]
+    return grown, gain
 
 
 @compiled
 def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
-    """The plant's states at times within the sample and at its end, (t, N, N) from those at its beginning and
-    (t, 2, N) from the new force and from the old one."""
+    """The plant's states at t times within the sample, the last at its end, with the gains of `sizes`.
+
+    Returns  what the states at the sample's beginning become, (t, N, N); and what a unit of the new
+             force (row 0) and of the old one (row 1) adds, (t, 2, N)
+    """
     A, n, f = loop.generator.copy(), loop.coordinates, len(loop.coulomb)
     N = len(A)
     for p in range(f):
-        strongest = 0.0
+        strongest = 0.0  # of a damper of 1 N s/m: decay rate of the motion in 1/samples, times T
         for i in range(n):
             strongest += abs(loop.force_inputs[n + i, p] * loop.friction_motions[p, i])
         b = damper_gain(loop.coulomb[p], max(sizes[VELOCITIES + p], LEAST))
@@ -127,19 +133,20 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
     # with a delay that is not whole, the old force acts first and the new one after it
     times = PARTS * (2 if loop.fractional_delay > 0.0 else 1)
     states, forces = np.zeros((times, N, N)), np.zeros((times, 2, N))
+    # E, g: states and forces so far;   which: the force that acts, 0 the new one, 1 the old one
     E, g, product = np.eye(N), np.zeros((2, N)), np.zeros((N, N))
     at = 0
     for which in range(1 if loop.fractional_delay > 0.0 else 0, -1, -1):
         share = loop.fractional_delay if which else 1.0 - loop.fractional_delay
-        one, gain = held_vibration_response(A, loop.drive, share / PARTS)
+        step, gain = held_vibration_response(A, loop.drive, share / PARTS)
         for _ in range(PARTS):
-            multiply(one, E, product)
+            multiply(step, E, product)
             E[:] = product
             for force in range(2):
                 for i in range(N):
                     total = gain[i] if force == which else 0.0
                     for j in range(N):
-                        total += one[i, j] * g[force, j]
+                        total += step[i, j] * g[force, j]
                     forces[at, force, i] = total
                 g[force] = forces[at, force]
             states[at] = E
@@ -155,12 +162,15 @@ def transition(
     the sample, from its beginning to its end [m per sample]; and the commanded force (M,).
 
     passes  share of the force that acts; negative: what its limit lets pass
+    states, forces  as `plant_steps` returns them
     """
+    # M states: N of the plant, queue of forces on their way, then those of force filter (f) and estimator (e)
     n, N = loop.coordinates, len(loop.generator)
     queue = loop.whole_delay + (1 if loop.fractional_delay > 0.0 else 0)
     f = N + queue
     e = f + len(loop.filter_A)
     M = e + len(loop.estimator_A)
+    # the others are rows: reading, estimated velocity and wall force by the states
     L, command, read, speed, wall = np.zeros((M, M)), np.zeros(M), np.zeros(M), np.zeros(M), np.zeros(M)
     if len(loop.step):
         first = VELOCITIES + len(loop.coulomb)
@@ -179,7 +189,7 @@ def transition(
         for j in range(n):
             L[e + i, j] = loop.estimator_input[i] * read[j]
         L[e + i, e:] = loop.estimator_A[i]
-        L[e + i, e + i] += 1.0
+        L[e + i, e + i] += 1.0  # A is that of differences, z - 1
     command[:] = -loop.filter_direct * wall
     for i in range(e - f):
         command[f + i] -= loop.filter_output[i]
@@ -220,28 +230,35 @@ def transition(
 
 
 @compiled
-def weights(late: float) -> Floats:
-    """Simpson's weights of the mean over a sample, which falls into two where the force changes within it."""
+def mean_weights(late: float) -> Floats:
+    """Simpson's weights of the mean over a sample, at its beginning and at the t times of `plant_steps`.
+
+    late  share of the sample after which the force changes, where the sample falls into two; 0: at its beginning
+    """
     share = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0
-    found = np.zeros(2 * PARTS + 1 if late > 0.0 else PARTS + 1)
+    weights = np.zeros(2 * PARTS + 1 if late > 0.0 else PARTS + 1)
     if late > 0.0:
-        found[: PARTS + 1] = late * share
-        found[PARTS:] += (1.0 - late) * share
+        weights[: PARTS + 1] = late * share
+        weights[PARTS:] += (1.0 - late) * share
     else:
-        found[:] = share
-    return found
+        weights[:] = share
+    return weights
 
 
 @compiled
 def sizes_of(loop: LoopArrays, state: Complexes, inside: Floats, command: Floats, mean: Floats) -> Floats:
-    """The sizes of a vibration with these states, which moves the sensor by 1 m."""
+    """The sizes of a vibration that moves the sensor by 1 m.
+
+    state            (M,)  of the loop at a sample, complex
+    inside, command  as `transition` returns them;   mean  (t + 1,)  `mean_weights`
+    """
     n, f, c, s = loop.coordinates, len(loop.coulomb), len(loop.step), len(loop.cubic)
-    found = np.zeros(VELOCITIES + f + c + s)
-    found[0] = 1.0
+    sizes = np.zeros(VELOCITIES + f + c + s)
+    sizes[AMPLITUDE] = 1.0
     force = 0.0j
     for i in range(len(state)):
         force += command[i] * state[i]
-    found[FORCE] = abs(force)
+    sizes[FORCE] = abs(force)
     for p in range(f):
         square = 0.0
         for t in range(len(mean)):
@@ -251,20 +268,23 @@ def sizes_of(loop: LoopArrays, state: Complexes, inside: Floats, command: Floats
                     for j in range(len(state)):
                         speed += loop.friction_motions[p, i] * inside[t, i, j] * state[j]
             square += mean[t] * (speed.real**2 + speed.imag**2)
-        found[VELOCITIES + p] = np.sqrt(square) / loop.period
+        sizes[VELOCITIES + p] = np.sqrt(square) / loop.period
     for k in range(c + s):
         moved = 0.0j
         for i in range(n):
             moved += (loop.counter_motions[k, i] if k < c else loop.spring_motions[k - c, i]) * state[i]
-        found[VELOCITIES + f + k] = abs(moved)
-    return found
+        sizes[VELOCITIES + f + k] = abs(moved)
+    return sizes
 
 
 @compiled
 def vibration_size(loop: LoopArrays, sizes: Floats, by_velocity: bool) -> float:
-    """Amplitude at the sensor [m]; by velocity, the length of the vector of the frictions' velocities [m/s]."""
+    """Size of a vibration with these sizes.
+
+    by_velocity  False: amplitude at the sensor [m]; True: length of the vector of the frictions' velocities [m/s]
+    """
     if not by_velocity:
-        return float(sizes[0])
+        return float(sizes[AMPLITUDE])
     square = 0.0
     for p in range(len(loop.coulomb)):
         square += sizes[VELOCITIES + p] ** 2
@@ -273,15 +293,18 @@ def vibration_size(loop: LoopArrays, sizes: Floats, by_velocity: bool) -> float:
 
 @compiled
 def vibrations(loop: LoopArrays, sizes: Floats, size: float, by_velocity: bool) -> tuple[Complexes, Floats]:
-    """All vibrations of this size of the linear loop with the gains of `sizes`: roots (k,), sizes (k, ...)."""
+    """All vibrations of this size (see `vibration_size`) of the linear loop that has the gains of `sizes`.
+
+    Returns  their roots (k,), and a row of sizes for each
+    """
     states, forces = plant_steps(loop, sizes)
     L, inside, command = transition(loop, sizes, -1.0, states, forces)
     roots, vectors = np.linalg.eig(L.astype(np.complex128))
-    n, M, mean = loop.coordinates, len(L), weights(loop.fractional_delay)
+    n, M, mean = loop.coordinates, len(L), mean_weights(loop.fractional_delay)
     most = 0.0
     for i in range(n):
         most = max(most, abs(loop.sensor[i]))
-    found_roots, found, count = np.zeros(M, np.complex128), np.zeros((M, len(sizes))), 0
+    found_roots, found_sizes, count = np.zeros(M, np.complex128), np.zeros((M, len(sizes))), 0
     for k in range(M):
         # of a pair the one above the real axis; a root on its negative side may be rounded to below it
         root = roots[k] if np.angle(roots[k]) > CREEPS - np.pi else np.conj(roots[k])
@@ -294,23 +317,23 @@ def vibrations(loop: LoopArrays, sizes: Floats, size: float, by_velocity: bool) 
                 reading += loop.sensor[i] * vectors[i, k]
         if not abs(reading) > UNREAD * most * whole:
             continue
-        here = sizes_of(loop, vectors[:, k] / reading, inside, command, mean)
+        unit_sizes = sizes_of(loop, vectors[:, k] / reading, inside, command, mean)
         found_roots[count] = root
-        found[count] = here * (size / vibration_size(loop, here, by_velocity))
+        found_sizes[count] = unit_sizes * (size / vibration_size(loop, unit_sizes, by_velocity))
         count += 1
-    return found_roots[:count], found[:count]
+    return found_roots[:count], found_sizes[:count]
 
 
 @compiled
 def size_difference(loop: LoopArrays, one: Floats, other: Floats, root: complex) -> float:
-    """Largest relative difference of two rows of sizes.
+    """Largest relative difference of two rows of sizes; root  z of the second.
 
     A friction that holds its motion fast is a damper that grows without end and a velocity that falls as fast,
     with no effect on the rest: a velocity counts relative to no less than that at which the friction takes a small
     share of the power which the wall can give.
     """
     f, most = len(loop.coulomb), 0.0
-    power = other[FORCE] * other[0] * abs(np.angle(root)) / loop.period
+    power = other[FORCE] * other[AMPLITUDE] * abs(np.angle(root)) / loop.period
     for i in range(len(one)):
         larger = max(abs(one[i]), abs(other[i]))
         if VELOCITIES <= i < VELOCITIES + f:
@@ -324,11 +347,15 @@ def size_difference(loop: LoopArrays, one: Floats, other: Floats, root: complex)
 def iterate_vibration(
     loop: LoopArrays, root: complex, start: Floats, size: float, by_velocity: bool, same: float
 ) -> tuple[bool, complex, Floats]:
-    """Shape and gains in agreement, following the root nearest to the start's; False where they do not come to it.
+    """Bring shape and gains into agreement, following the root nearest to the start's.
 
-    same  largest relative change of a size, and change of the root, that counts as none
+    root, start  z and sizes to start from;   size, by_velocity  size that is kept, see `vibration_size`
+    same     largest relative change of a size, and change of the root, that counts as none
+    Returns  whether they agree (False: no root swings, or no agreement is reached), the last root, and its sizes
     """
     now, z = start * (size / vibration_size(loop, start, by_velocity)), root
+    # last, peak: largest change in the block before and in this one;   vain: blocks in a row without progress
+    # weight: share of the step that is taken;   before: the last change
     weight, before, last, peak, vain = 1.0, np.inf, np.inf, 0.0, 0
     for iteration in range(ITERATIONS):
         roots, all_sizes = vibrations(loop, now, size, by_velocity)
@@ -355,6 +382,7 @@ def iterate_vibration(
             # sizes differ by orders of magnitude and stay positive, so that the mean is taken of their logarithms
             both = now[i] > 0.0 and after[i] > 0.0
             now[i] = np.exp((1.0 - weight) * np.log(now[i]) + weight * np.log(after[i])) if both else after[i]
+    # rounding can keep the changes above `same`; so near they count as agreement
     return before < 1e-6, z, now
 
 
@@ -362,7 +390,7 @@ def iterate_vibration(
 def fastest_vibration(
     loop: LoopArrays, root: complex, start: Floats, size: float, by_velocity: bool, same: float
 ) -> tuple[bool, complex, Floats]:
-    """The fastest growing vibration of this size near a start; False where nothing swings."""
+    """The fastest growing vibration of this size near a start; takes and returns what `iterate_vibration` does."""
     known, z, sizes = iterate_vibration(loop, root, start, size, by_velocity, same)
     for _ in range(ROUNDS):
         if not known:
@@ -386,17 +414,17 @@ SMALL: Final = 0.25
 
 
 @compiled_lean
-def multiply(a: Floats, b: Floats, out: Floats) -> None:
-    """Fill out (N, N) with the product a b."""
-    N = a.shape[0]
+def multiply(left: Floats, right: Floats, product: Floats) -> None:
+    """Fill product (N, N) with left times right."""
+    N = left.shape[0]
     for i in range(N):
         for j in range(N):
-            out[i, j] = 0.0
+            product[i, j] = 0.0
         for k in range(N):
-            value = a[i, k]
+            value = left[i, k]
             if value != 0.0:
                 for j in range(N):
-                    out[i, j] += value * b[k, j]
+                    product[i, j] += value * right[k, j]
 
 
 @compiled_lean

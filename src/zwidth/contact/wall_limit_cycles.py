@@ -98,7 +98,7 @@ def predict_limit_cycles(
     check_number("damping", damping, "N s/m")
     loop, K, B = point.loop, stiffness, damping
     balance = harmonic_balance(loop, K, B, offset=offset, largest_motion=largest_motion(point), progress=progress)
-    cycles, by = _balanced_cycles(loop, K, B, balance, parts)
+    cycles, method = _balanced_cycles(loop, K, B, balance, parts)
     runs = _Simulations([[] for _ in cycles], None, [])
     if simulate:
         tell = progress or (lambda stage, done, of: None)
@@ -106,7 +106,7 @@ def predict_limit_cycles(
         runs = _simulate_all(loop, K, B, offset, cycles, balance.largest_motion)
         tell("simulating", 1, 1)
     found = answered_cycles(cycles, runs.near_cycles, runs.others, balance.largest_motion)
-    resting, quiet = _limits(loop, K, B)
+    resting, quiet = _stiffest_without_hunting(loop, K, B)
     return LimitCyclePrediction(
         wall_stiffness=K,
         wall_damping=B,
@@ -114,7 +114,7 @@ def predict_limit_cycles(
         verdict=judge(loop, [K], [B]).names[0],
         nonlinear=parts,
         left_out=tuple(name for name in point.linear_omissions if name in NOT_PREDICTED),
-        predicted_by=by,
+        predicted_by=method,
         balance=balance,
         answers=found.cycles,
         contradicted=found.contradicted,
@@ -156,7 +156,7 @@ def largest_motion(point: OperatingPoint) -> float:
     if point.handle_range is None:
         return LARGEST_MOTION
     back, forth = point.handle_range
-    # at the edge of the workspace it moves to one side only, and about a middle within that
+    # at the edge of the workspace it moves to one side only, and then about a middle within that
     return min(-back, forth) or max(-back, forth) / 2.0
 
 
@@ -170,10 +170,10 @@ def _balanced_cycles(
 ) -> tuple[tuple[LimitCycle, ...], str]:
     """Return the cycles of a balance on a wall (K [N/m], B [N s/m]), with harmonics where only the force is
     limited, and the method in words."""
-    cycles, by = balance.cycles, BY_FIRST
+    cycles, method = balance.cycles, BY_FIRST
     if parts == ("the force limit",):
-        cycles, by = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
-    return cycles, by
+        cycles, method = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
+    return cycles, method
 
 
 class _Simulations(NamedTuple):
@@ -192,7 +192,7 @@ def _simulate_all(
 ) -> _Simulations:
     """Simulate a wall (K [N/m], B [N s/m]) from near each cycle that settles, from a small start where none does,
     and from large starts below the largest motion [m]."""
-    runs = [_simulated(loop, K, B, offset, cycle) if settles(cycle) else [] for cycle in cycles]
+    runs = [_simulate_near_cycle(loop, K, B, offset, cycle) if settles(cycle) else [] for cycle in cycles]
     small_start, others = None, list[SimulatedVibration]()
     if not any(map(settles, cycles)):
         small_start = _simulate_small_start(loop, K, B, offset, cycles)
@@ -201,37 +201,50 @@ def _simulate_all(
     return _Simulations(runs, small_start, others)
 
 
-def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]:
+def _stiffest_without_hunting(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]:
     """Stiffest walls by `resting_limit` and `quiet_limit` [N/m]; None where they are not known."""
     if not K > 0.0:
         return None, None
     try:
-        resting = float(2.0 * device_plane(loop, [K]).sigma[0] * K)
+        resting = float(2.0 * device_plane(loop, [K]).sigma[0] * K)  # 2 f_c/Delta
     except ValueError:  # no steps, or tied to the ground
         return None, None
     return resting, max(resting - 2.0 * abs(B) / loop.period, 0.0)
 
 
-def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle) -> list[SimulatedVibration]:
-    """Simulate the wall K [N/m], B [N s/m] from both sides of a cycle; where each run ends."""
-    return _runs(loop, K, B, offset, [share * cycle.amplitude for share in STARTS], cycle.frequency_Hz)
+def _simulate_near_cycle(
+    loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle
+) -> list[SimulatedVibration]:
+    """Simulate the wall K [N/m], B [N s/m] from both sides of a cycle; where each run ends.
+
+    offset  middle of the vibration, as a share of an encoder step
+    """
+    return _simulate_starts(loop, K, B, offset, [share * cycle.amplitude for share in STARTS], cycle.frequency_Hz)
 
 
 def _simulate_small_start(
     loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...]
 ) -> SimulatedVibration:
-    """Simulate from a start of a few counts, well within the smallest cycle, which should decay."""
-    quantum = reading_step(loop.plant)
+    """Simulate from a start of a few counts, well within the smallest cycle, where vibration should decay.
+
+    K, B  of the wall [N/m], [N s/m];   offset  middle of the vibration, as a share of an encoder step
+    """
+    quantum = reading_step(loop.plant)  # encoder step of the reading [m], 0 without
     starts = [COUNTS * quantum] if quantum else [SMALL]
     starts += [0.5 * cycle.amplitude for cycle in cycles]
     frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period
-    return _runs(loop, K, B, offset, [min(starts)], frequency)[0]
+    return _simulate_starts(loop, K, B, offset, [min(starts)], frequency)[0]
 
 
 def _simulate_large_starts(
     loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...], largest: float
 ) -> list[SimulatedVibration]:
-    """Simulate from where a force at its limit may keep up a vibration that small ones do not grow into."""
+    """Simulate from where a force at its limit may keep up a vibration that small ones do not grow into.
+
+    largest       motion of the device, beyond which no run starts [m]
+    K, B, offset  as in `_simulate_small_start`
+    Returns       where each run ends; none where the force has no limit
+    """
     limit = loop.nonlinear.force_limit
     if not (limit < inf and K > 0.0):
         return []
@@ -240,24 +253,27 @@ def _simulate_large_starts(
     ]
     frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period
     within = sorted({start for start in starts if start < largest})
-    return _runs(loop, K, B, offset, within, frequency) if within else []
+    return _simulate_starts(loop, K, B, offset, within, frequency) if within else []
 
 
-def _runs(
+def _simulate_starts(
     loop: Loop, K: float, B: float, offset: float, starts: list[float], frequency: float
 ) -> list[SimulatedVibration]:
-    """Simulate a wall from starts [m] off the middle, for CYCLES periods of a frequency [Hz]; where each ends."""
+    """Simulate a wall from starts [m] off the middle, for CYCLES periods of a frequency [Hz]; where each ends.
+
+    K, B, offset  as in `_simulate_small_start`
+    """
     T = loop.period
     seconds = float(np.clip(CYCLES / frequency, FEWEST * T, MOST * T))
-    middle, place = _middle(loop, offset)
+    middle, wall_position = _middle(loop, offset)
     shape = least_deforming_motion(loop.plant)
-    own = wall.values(stiffness=K, damping=B)
+    values = wall.values(stiffness=K, damping=B)
     runs = [
         Run(
             loop,
-            own,
+            values,
             start=(middle + start * shape, np.zeros(loop.plant.size)),
-            wall_position=place,
+            wall_position=wall_position,
             bound=max(1.0, 1e3 * start),
         )
         for start in starts
@@ -273,7 +289,10 @@ def _runs(
 
 
 def behaviour_at_the_end(response: TimeResponse, judged: Judgement, quarter: int) -> Behaviour:
-    """How a run ends, where that is to be held against a prediction; quarter is in samples."""
+    """How a run ends, as `judge_response` says, but for what would mislead beside a predicted limit cycle.
+
+    quarter  samples in a quarter of the run
+    """
     if judged.behaviour == "converged" and np.ptp(response.reading[-quarter:]) > 0.0:
         # between two counts a relay keeps up motions far below a step; noise alone does, too
         return "undecided" if response.noise > 0.0 else "limit cycle"
@@ -283,8 +302,8 @@ def behaviour_at_the_end(response: TimeResponse, judged: Judgement, quarter: int
 
 
 def _middle(loop: Loop, offset: float) -> tuple[Floats, float]:
-    """Coordinates at which every encoder is that share of its step beyond a count, and what is read there without
-    steps [m]."""
+    """Coordinates (n,) at which every encoder is the share `offset` of its step beyond a count, and what is read
+    there without steps [m]."""
     counters = [part for part in loop.plant.nonlinear.counters if part.step > 0.0]
     if offset == 0.0 or not counters:
         return np.zeros(loop.plant.size), 0.0
@@ -422,7 +441,7 @@ class LimitCyclePrediction(Result):
         ]
         documents = [simulated.document() if simulated else {} for simulated in self.simulated]
         for name in ("behaviour", "amplitude_m", "frequency_Hz"):
-            columns[f"simulated_{name}"] = [own.get(name) for own in documents]
+            columns[f"simulated_{name}"] = [vibration.get(name) for vibration in documents]
         return columns
 
     def __repr__(self) -> str:
@@ -486,28 +505,29 @@ def answered_cycles(
 
     runs    of each predicted cycle, from both sides of it; () for one that was not simulated
     others  from other starts
+    largest_motion  of the device to either side [m]: a simulated vibration beyond it is no answer
     """
     cycles: list[LimitCycleAnswer] = []
     contradicted: list[LimitCycleAnswer] = []
-    everything = [*(run for own in runs for run in own), *others]
-    for cycle, own in zip(predicted, runs, strict=True):
-        if not own:
+    everything = [*(run for cycle_runs in runs for run in cycle_runs), *others]
+    for cycle, cycle_runs in zip(predicted, runs, strict=True):
+        if not cycle_runs:
             cycles.append(LimitCycleAnswer(cycle, "describing function", None, None, cycle))
             continue
         # one that only another start leads to is there, too
-        nearest = _nearest(cycle, [run for run in everything if agrees(cycle, run)] or own)
-        outcome = _outcome(cycle, own, nearest)
+        nearest = _nearest(cycle, [run for run in everything if agrees(cycle, run)] or cycle_runs)
+        outcome = _outcome(cycle, cycle_runs, nearest)
         if outcome == "none":
             contradicted.append(LimitCycleAnswer(cycle, "describing function", False, nearest, cycle))
         elif outcome == "other":
-            _add(cycles, _as_cycle(nearest, largest_motion), nearest, cycle)
-        else:
+            _add_if_new(cycles, _as_cycle(nearest, largest_motion), nearest, cycle)
+        else:  # the same, confirmed, or open: None
             cycles.append(
                 LimitCycleAnswer(cycle, "describing function", outcome == "same" or None, nearest, cycle)
             )
     for vibration in everything:
         if vibration.behaviour == "limit cycle" and 0.0 < vibration.amplitude <= largest_motion:
-            _add(cycles, _as_cycle(vibration, largest_motion), vibration, None)
+            _add_if_new(cycles, _as_cycle(vibration, largest_motion), vibration, None)
     return Answers(tuple(sorted(cycles, key=lambda answer: answer.cycle.amplitude)), tuple(contradicted))
 
 
@@ -522,7 +542,11 @@ def _nearest(cycle: LimitCycle, runs: Sequence[SimulatedVibration]) -> Simulated
 
 
 def _outcome(cycle: LimitCycle, runs: Sequence[SimulatedVibration], nearest: SimulatedVibration) -> Outcome:
-    """What runs from both sides say of a cycle; "open" where none has settled."""
+    """What runs from both sides say of a predicted cycle: "same", they end in it; "other", in another one; "none",
+    in none; "open", none has settled.
+
+    nearest  run that ends nearest to the cycle
+    """
     if nearest.behaviour == "limit cycle":
         return "same" if agrees(cycle, nearest) else "other"
     if all(run.behaviour in STILL for run in runs):
@@ -537,10 +561,13 @@ def _as_cycle(vibration: SimulatedVibration, largest_motion: float) -> LimitCycl
     return LimitCycle(vibration.amplitude, vibration.frequency, True, nan, np.zeros(0), largest_motion)
 
 
-def _add(
+def _add_if_new(
     cycles: list[LimitCycleAnswer], cycle: LimitCycle, vibration: SimulatedVibration, predicted: LimitCycle | None
 ) -> None:
-    """Add a simulated cycle, unless it is one of those already known."""
+    """Add a simulated cycle to the answers, unless a stable one of them agrees with it.
+
+    predicted  what was predicted in its place, which a known one gets if it has none; None: nothing
+    """
     source: CycleSource = "simulation"
     for n, known in enumerate(cycles):
         if known.cycle.stable and agrees(known.cycle, vibration):

@@ -47,19 +47,19 @@ def buzz_at(point: OperatingPoint, wanted: WantedWall) -> float:
     except FeedbackError as error:
         raise NoValueError(str(error)) from None
     offsets = (0.0, BETWEEN_COUNTS) if "encoder steps" in parts else (0.0,)
-    return max(_loudest(point, *wall, offset) for offset in offsets)
+    return max(_largest_over_threshold(point, *wall, offset) for offset in offsets)
 
 
-def _loudest(point: OperatingPoint, K: float, B: float, offset: float) -> float:
+def _largest_over_threshold(point: OperatingPoint, K: float, B: float, offset: float) -> float:
     """Largest ratio of handle amplitude and threshold over the stable limit cycles on a wall K [N/m], B [N s/m];
     0 without any, inf where vibration grows beyond the range. offset: its middle as a share of an encoder step."""
-    found = predict_limit_cycles(point, K, B, offset=offset, simulate=False)
-    kept_up = [cycle for cycle in found.cycles if settles(cycle)]
-    if found.leaves_range or (found.verdict == "unstable" and not kept_up):
+    prediction = predict_limit_cycles(point, K, B, offset=offset, simulate=False)
+    kept_up = [cycle for cycle in prediction.cycles if settles(cycle)]
+    if prediction.leaves_range or (prediction.verdict == "unstable" and not kept_up):
         return float("inf")
     ratios = [0.0]
     for cycle in kept_up:
-        moved = cycle.amplitude
+        moved = cycle.amplitude  # of the sensor; then of the handle
         if point.plant.handle is not None:
             moved *= float(np.abs(deformation_ratio(point.plant, cycle.frequency_Hz)))
         ratios.append(moved / float(detection_threshold(cycle.frequency_Hz)))

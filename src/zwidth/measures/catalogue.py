@@ -56,7 +56,8 @@ def _measure(
 ) -> Measure:
     """Measure of a group of the catalogue, computed by the function `NAME_at` of the group's file.
 
-    wall, linear  `of_wall` and `linear` of `Measure`; None: as is usual in the group
+    name ... along  fields of `Measure`
+    wall, linear    its `of_wall` and `linear`; None: as is usual in the group
     """
     linear = group not in _OF_THE_MECHANISM if linear is None else linear
     function = f"zwidth.measures.{_FILES[group]}:{name}_at"

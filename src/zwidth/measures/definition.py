@@ -176,7 +176,8 @@ class NoteSummary:
 
     def notes(self) -> tuple[Note, ...]:
         """The joined notes in the order of their first cells, those that count further reasons last."""
-        return tuple(Note(*key, *rest) for counts in (self._kept, self._more) for key, rest in counts.items())
+        # status and reason, then count and first index
+        return tuple(Note(*key, *cells) for counts in (self._kept, self._more) for key, cells in counts.items())
 
 
 def merge_notes(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ...]:
@@ -273,8 +274,10 @@ class Measure:
         >>> Measure("stable_area", "", "N^2 s/m^2", None, "", "").key
         'stable_area_N2s_per_m2'
         """
-        over, _, under = self.unit.replace("kg m", "kg_m").replace(" ", "").replace("^", "").partition("/")
-        written = over + (f"_per_{under}" if under else "")
+        numerator, _, denominator = (
+            self.unit.replace("kg m", "kg_m").replace(" ", "").replace("^", "").partition("/")
+        )
+        written = numerator + (f"_per_{denominator}" if denominator else "")
         plain = re.fullmatch(r"[A-Za-z0-9_]+", written) and "^r" not in self.unit
         return f"{self.name}_{written}" if plain else self.name
 

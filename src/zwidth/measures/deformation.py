@@ -95,9 +95,11 @@ def structural_distortion(plant: Plant, frequency: float) -> float:
     fixed_plant, top = _fix_actuator(plant), 2.0 * np.pi * frequency
     poles = fixed_plant.poles
     sharp = poles.imag[(poles.imag > 0.0) & (np.abs(poles.real) <= SHARP * np.abs(poles)) & (poles.imag < top)]
+    # at a resonance without damping that moves the structure, 1 - S grows as w comes nearer
     beside = np.abs(fixed_plant.deformation(sharp[:, None] * (1.0 + np.array([1e-6, 1e-4]))))
     if np.any(beside[:, 0] > 10.0 * beside[:, 1]):
         return float("inf")
+    # about each resonance, in units of its half width
     near = poles.imag[:, None] + np.abs(poles.real)[:, None] * ABOUT
     even, slow = np.linspace(0.0, top, TRIED)[1:], np.geomspace(SLOWEST * top, top, TRIED)
     frequencies = np.concatenate([even, slow, near[(near > 0.0) & (near < top)]])
@@ -144,7 +146,8 @@ class _FixedActuatorPlant:
     def deformation(self, w: Floats) -> Complexes:
         """Share of the actuator's motion that deforms the structure, 1 - S (...), at w (...) [rad/s]."""
         s = 1j * np.asarray(w, dtype=np.complex128)[..., None]
-        push = s**2 * self.push[0] + s * self.push[1] + self.push[2] + 1j * self.loss_push
+        by_acceleration, by_speed, by_position = self.push
+        push = s**2 * by_acceleration + s * by_speed + by_position + 1j * self.loss_push
         inner = s[..., None] ** 2 * np.eye(len(self.squared_frequencies)) + s[..., None] * self.damping
         inner = inner + np.diag(self.squared_frequencies) + 1j * self.loss
         for along, damping, lag, actuator_share in self.dampers:
@@ -180,6 +183,7 @@ def _fix_actuator(plant: Plant) -> _FixedActuatorPlant:
             fixed_motions.T @ plant.mass @ fixed_motions, fixed_motions.T @ plant.stiffness @ fixed_motions
         )
         fixed_motions = fixed_motions @ shapes
+    # x_0: with a . x_0 = 1, and no force of the springs along the stiff modes, N^T K x_0 = 0
     start = a / (a @ a)
     stiff = rates != 0.0
     start = start - fixed_motions[:, stiff] @ (
@@ -223,12 +227,12 @@ def optimal_spectral_radius_at(point: OperatingPoint, wanted: WantedWall) -> Mea
 
     Of the motor side on the structure's spring; the device's own masses do not matter.
     """
-    return with_status(point, _optimal(point, wanted).spectral_radius, _NOT_REACHED)
+    return with_status(point, _optimal_mass(point, wanted).spectral_radius, _NOT_REACHED)
 
 
 def optimal_motor_side_mass_at(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
     """Motor-side mass with which vibration at the wanted wall decays fastest [kg] (thesis eq. 5.14 with 5.15)."""
-    return with_status(point, _optimal(point, wanted).mass, _NOT_REACHED)
+    return with_status(point, _optimal_mass(point, wanted).mass, _NOT_REACHED)
 
 
 def structural_distortion_at(point: OperatingPoint, wanted: WantedWall) -> float:
@@ -236,7 +240,7 @@ def structural_distortion_at(point: OperatingPoint, wanted: WantedWall) -> float
     return structural_distortion(plant_with_handle(point), frequency_of(wanted))
 
 
-def _optimal(point: OperatingPoint, wanted: WantedWall) -> OptimalMass:
+def _optimal_mass(point: OperatingPoint, wanted: WantedWall) -> OptimalMass:
     """Motor-side mass of fastest decay at the wanted wall, in closed form, at all points.
 
     Raises  MeasureError  where the device breaks what the closed form assumes

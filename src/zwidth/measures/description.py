@@ -68,13 +68,13 @@ class Description(Result):
     def document(self) -> dict[str, Any]:
         """The numbers by key and unit; None where inapplicable."""
         felt = self.effective
-        own = {
+        masses = {
             "link_side_mass_kg": felt and felt.link_side_mass,
             "motor_side_mass_kg": felt and felt.motor_side_mass,
             "rigid_mass_kg": felt and felt.rigid_mass,
             "stiffness_N_per_m": felt and felt.stiffness,
         } | super().document()
-        return own | ({} if self.joints is not None else {"beams": None})
+        return masses | ({} if self.joints is not None else {"beams": None})
 
     def table(self) -> dict[str, list[Any]]:
         """Every single number with its dotted key, in the columns `key` and `value`."""
@@ -82,12 +82,12 @@ class Description(Result):
 
     def __repr__(self) -> str:
         """Lines with masses, stiffness, natural frequencies and dexterity."""
-        lines = [*self._masses()]
+        lines = [*self._mass_lines()]
         if self.manipulability is not None:
             lines.append(f"manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}")
         return "\n  ".join(lines)
 
-    def _masses(self) -> Iterator[str]:
+    def _mass_lines(self) -> Iterator[str]:
         """Lines with masses [kg], stiffness [N/m] and at most eight natural frequencies [Hz]."""
         felt = self.effective
         if felt is None or self.natural_frequencies is None:
@@ -147,7 +147,7 @@ def joint_coordinates(mechanism: Mechanism, coordinates: Floats) -> dict[str, An
     several."""
     joints: dict[str, Any] = {}
     for name, kind, value in zip(mechanism.links.names, mechanism.links.joint, coordinates.tolist(), strict=True):
-        joint = name.partition("/")[0]
+        joint = name.partition("/")[0]  # without what tells the links of a joint with several coordinates apart
         if kind == FIXED:
             joints[joint] = 0.0
         elif joint in joints:
@@ -159,7 +159,9 @@ def joint_coordinates(mechanism: Mechanism, coordinates: Floats) -> dict[str, An
 
 
 def damping_ratios(plant: Plant) -> list[float | None] | None:
-    """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes.
+    """Damping ratio a/w of each natural frequency w, a its decay rate; None for rigid ones.
+
+    Returns None in place of the list where damping couples modes.
 
     A hysteretic loss L adds its loss per cycle at that frequency: x^T L x / (2 w^2), half the loss factor.
     """

@@ -173,7 +173,8 @@ def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[F
 
     jacobian  (..., 3, d)       J [m/rad]
     freedoms  as for `manipulability`
-    Returns   (..., min(3, d))  values [m/rad], nan where J is nan, and the same shape of marks
+    Returns   (..., min(3, d))  values [m/rad], nan where J is nan; and as many flags, True where one counts, and
+                                where J is nan
     Raises    ValueError        if there are not so many freedoms
 
     >>> singular_values([[0.0, -0.2], [0.3, 0.0], [0.0, 0.0]])[0]
@@ -196,7 +197,7 @@ def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[F
 
 
 def _without_nan(matrix: ArrayLike) -> tuple[Floats, Flags]:
-    """A matrix (..., m, n) set to 0 where it has a nan, on which LAPACK fails, and a mark (...) of where."""
+    """A matrix (..., m, n) set to 0 where it has a nan, on which LAPACK fails, and flags (...) of where."""
     A = np.asarray(matrix, dtype=np.float64)
     unknown: Flags = np.asarray(np.isnan(A).any(axis=(-2, -1)))
     return np.where(unknown[..., None, None], 0.0, A), unknown

@@ -143,7 +143,7 @@ def with_status(point: OperatingPoint, values: Floats, reason: str = "has no val
 
 
 def _same_status(point: OperatingPoint, status: int, reason: str) -> MeasureValues:
-    """No value at any point: those that are OK have this status and reason."""
+    """Values for a measure that has none at any point: those that are OK get this status and reason."""
     failed = point.status == OK
     notes = (_note(failed, status, reason),) if failed.any() else ()
     return MeasureValues(
@@ -152,19 +152,19 @@ def _same_status(point: OperatingPoint, status: int, reason: str) -> MeasureValu
 
 
 def _note(points: Flags, status: int, reason: str) -> Note:
-    """Note with this status and reason about the marked points (...)."""
+    """Note with this status and reason about the points whose flag (...) is True."""
     return Note(status, reason, int(points.sum()), tuple(int(i) for i in np.argwhere(points)[0]))
 
 
 def evaluate_pointwise(compute: Callable[[OperatingPoint], Any], point: OperatingPoint) -> MeasureValues:
-    """Call a function with one point at a time, for all points."""
+    """Values at all points by a function that is called with one point at a time."""
     return complete_pointwise(np.full(point.shape, np.nan), lambda index: compute(point[index]), point)
 
 
 def complete_pointwise(
     known: Floats, compute: Callable[[tuple[int, ...]], Any], point: OperatingPoint
 ) -> MeasureValues:
-    """Values at all points: those known, and where these are nan those that a function of an index returns."""
+    """Values at all points: those known (...), and where these are nan those that `compute` gives for an index."""
     status = point.status.copy()
     values = np.where(status == OK, known, np.nan)
     why: dict[tuple[int, ...], tuple[int, str]] = {}
@@ -182,9 +182,10 @@ def complete_charts(
     alone: Callable[[tuple[int, ...]], float],
     none_stable: str = "",
 ) -> MeasureValues:
-    """Values at all points from those of their charts (N,), those in doubt by a function of an index.
+    """Values at all N points from those of their charts, those in doubt computed one by one.
 
-    states       (N,)   FOUND, NO_WALL or DOUBTFUL
+    flat         (N,)   values by the charts;   states  (N,)  FOUND, NO_WALL or DOUBTFUL
+    alone        computes the value at the point of an index
     none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
     """
     values, found = flat.reshape(point.shape), states.reshape(point.shape)
@@ -203,16 +204,20 @@ def complete_charts(
 
 
 def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
-    """Notes from the status and reason of each point without value, in the order of the points."""
+    """Notes from the status and reason of each point without value, by its index, in the order of the points."""
     by_reason: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
     for index, key in why.items():
         count, first = by_reason.get(key, (0, index))
         by_reason[key] = (count + 1, first)
-    return tuple(Note(*key, *rest) for key, rest in by_reason.items())
+    # status and reason, then count and first index
+    return tuple(Note(*key, *cells) for key, cells in by_reason.items())
 
 
 def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
-    """Value, status and reason of one call; only a MeasureError is raised."""
+    """Value, status and reason of one call; only a MeasureError is raised.
+
+    Value nan unless the status is OK; reason "" where there is a value, or the result gives none.
+    """
     try:
         result = compute()
         if isinstance(result, MeasureValues):

@@ -168,15 +168,17 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
     theta = port.theta[inner]
     frequency = theta / (2.0 * np.pi * port.period)
     jw = 2j * np.pi * frequency
-    force, speed = _law(controller, theta)
+    force, speed = _computer_responses(controller, theta)
     paths = {name: value[inner] for name, value in port.baseband.items()} | {"P": port.sampled["sa"][inner]}
     deviations = {source: deviation[inner] for source, deviation in port.deviations.items()}
-    own = port.model.modes[:, 0]
-    lowest = min([*own[own > 0.0], LOWEST_MODE * np.pi])
+    modes = port.model.modes[:, 0]
+    lowest = min([*modes[modes > 0.0], LOWEST_MODE * np.pi])
     low = slice(0, max(FEWEST, int(np.searchsorted(theta, AT_REST * lowest))))
+    # stiffness and mass felt with a wall of a response
     at_rest = partial(_felt_at_rest, port, theta, low, paths, deviations)
+    # encoder and handle are one place where both paths are one measurement
     rigid = port.origin["hh"] == port.origin["sh"]
-    spring = not (port.model.free or np.any(own == 0.0))
+    spring = not (port.model.free or np.any(modes == 0.0))
     unyielding = UNYIELDING * float(np.max(np.abs(1.0 / paths["P"])))
     limit = np.inf if rigid else at_rest(unyielding * force)[0]
     free = 1.0 / (jw * paths["hh"])
@@ -218,14 +220,18 @@ def _felt_at_rest(
     """Return stiffness [N/m] and mass [kg] felt at rest with a wall of this response (k,); nan where errors hide
     them.
 
-    theta  (k,) angles;   low  those well below the lowest mode;   paths, deviations  (k,) by name
+    theta  (k,)  omega T [rad];   low  those well below the lowest mode
+    paths, deviations  measured responses (k,) by name, such as "hh" of handle per hand force, and their errors
     """
     spread = _motion_deviation(port, paths, deviations, law)
     return _stiffness_and_mass(theta[low] / port.period, _handle_motion(paths, law)[low], spread[low])
 
 
-def _law(controller: Controller, theta: Floats) -> tuple[Complexes, Complexes]:
-    """Responses (k,) of force filter with software's delay, and of velocity estimate [1/s], at angles (k,)."""
+def _computer_responses(controller: Controller, theta: Floats) -> tuple[Complexes, Complexes]:
+    """Responses (k,) of force filter with software's delay, and of velocity estimate [1/s].
+
+    theta  (k,)  angles omega T [rad]
+    """
     z, d = np.exp(1j * theta), np.expm1(1j * theta)
     force, speed = force_filter(controller), velocity_estimator(controller)
     passed = factor_response(force.numerator, force.denominator, d) * z ** -round(controller.delay)
@@ -241,11 +247,16 @@ def _handle_motion(paths: dict[str, Complexes], law: Complexes) -> Complexes:
 def _motion_deviation(
     port: MeasuredPort, paths: dict[str, Complexes], deviations: dict[str, Floats], law: Complexes
 ) -> Floats:
-    """Standard deviation (k,) of `_handle_motion`, the errors of different measurements independent."""
+    """Standard deviation (k,) of `_handle_motion` [m/N], the errors of different measurements independent.
+
+    paths, deviations  measured responses by name, and their standard deviations (k,);   law  of the wall [N/m]
+    """
     answer = law / (1.0 + paths["P"] * law)
+    # derivatives of the handle's motion by each path
     slopes = {"hh": 1.0 + 0.0 * law, "sh": -paths["ha"] * answer, "ha": -answer * paths["sh"]}
     slopes["sa"] = paths["ha"] * paths["sh"] * answer**2
     by_source: dict[str, Complexes] = {}
+    # paths of one measurement share its error, so that their derivatives add up
     for name, slope in slopes.items():
         source = port.origin[name]
         scale = np.abs(paths[name]) / np.maximum(np.abs(paths[source]), 1e-300) if name != source else 1.0
@@ -260,9 +271,10 @@ def _stiffness_and_mass(omega: Floats, motion: Complexes, deviation: Floats) -> 
     if np.count_nonzero(clear) < FEWEST:
         return np.nan, np.nan
     omega, motion, deviation = omega[clear], motion[clear], deviation[clear]
-    square = (omega / omega[-1]) ** 2
+    square = (omega / omega[-1]) ** 2  # in these units: k, m w_last^2 and c w_last^4 are of one size
     columns = np.vander(square, 3, increasing=True)
     known = bool(np.all(deviation > 0.0))
+    # of S = 1/motion the standard deviation is deviation/|motion|^2
     weight = np.abs(motion) ** 2 / deviation if known else np.ones(len(square))
     solution = np.linalg.lstsq(columns * weight[:, None], np.real(1.0 / motion) * weight, rcond=None)[0]
     spread = np.zeros(3)
@@ -393,6 +405,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     check_kind("chart", chart, StabilityChart)
     plant = device or chart.loop.plant
     walls = np.vstack(chart.regions) if chart.regions else np.zeros((1, 2))
+    # least and largest damping, and largest stiffness
     (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)
     computer = chart.loop.controller
     half_plane = shapely.box(0.0, low - 1.0, max(right, 0.0) + 1.0, high + 1.0)
@@ -408,7 +421,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
                 rings.append(ring if shapely.LinearRing(ring).is_ccw else ring[::-1])
     arcs = []
     for arc in chart.boundary:
-        for run in _runs(arc.stiffness >= 0.0):
+        for run in _true_runs(arc.stiffness >= 0.0):
             stiffness = static_stiffness(plant, arc.stiffness[run], computer)
             arcs.append(BoundaryArc(stiffness, arc.damping[run], arc.frequency[run]))
     felt = FeltChart(
@@ -423,7 +436,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     return felt if chart.operating_point is None else felt.about(chart.operating_point)
 
 
-def _runs(inside: Flags) -> list[slice]:
+def _true_runs(inside: Flags) -> list[slice]:
     """Slices of `inside` (k,) that hold a run of at least two True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]

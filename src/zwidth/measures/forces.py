@@ -78,7 +78,7 @@ def force_component(jacobian: ArrayLike, direction: ArrayLike, torques: ArrayLik
     """
     q, moves = joint_rates(jacobian, direction)
     t = np.asarray(torques, dtype=np.float64)
-    return np.asarray(np.where(moves | np.isnan(q[..., 0]), _total(t, q), np.inf))
+    return np.asarray(np.where(moves | np.isnan(q[..., 0]), _sum_by_rates(t, q), np.inf))
 
 
 def acceleration_along(
@@ -126,7 +126,7 @@ def resolution_along(jacobian: ArrayLike, direction: ArrayLike, steps: ArrayLike
     >>> round(float(resolution_along([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [1e-3, 1e-3])), 9)
     0.00044
     """
-    return _total(np.asarray(steps, dtype=np.float64), _torques_per_force(jacobian, direction))
+    return _sum_by_rates(np.asarray(steps, dtype=np.float64), _torques_per_force(jacobian, direction))
 
 
 def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLike) -> Floats:
@@ -149,7 +149,7 @@ def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLi
     0.5
     """
     q, moves = joint_rates(jacobian, direction)
-    return np.asarray(np.where(moves, _total(np.asarray(frictions, dtype=np.float64), q), np.nan))
+    return np.asarray(np.where(moves, _sum_by_rates(np.asarray(frictions, dtype=np.float64), q), np.nan))
 
 
 def heat_along(jacobian: ArrayLike, direction: ArrayLike, force: ArrayLike, motor_constants: ArrayLike) -> Floats:
@@ -207,20 +207,20 @@ def _directions(direction: ArrayLike) -> Floats:
     return screw(direction) if np.shape(direction)[-1:] == (6,) else unit_directions(direction)
 
 
-def _total(each: Floats, rates: Floats) -> Floats:
-    """Sum of each number times |rate|, where inf times 0 is 0: a drive that stands still does no work."""
+def _sum_by_rates(each: Floats, rates: Floats) -> Floats:
+    """Sum (...) of each drive's number (..., d) times |rate| (..., d); inf times 0 is 0: no motion, no work."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(rates == 0.0, 0.0, each * np.abs(rates)).sum(axis=-1))
 
 
 def peak_force_at(point: OperatingPoint) -> Floats:
     """Largest force exactly along the rendered direction within the torque limits [N]."""
-    return force_along(_jacobian(point), point.direction, _torques(point, "torque_limit_Nm"))
+    return force_along(_jacobian(point), point.direction, _joint_torques(point, "torque_limit_Nm"))
 
 
 def continuous_force_at(point: OperatingPoint) -> Floats:
     """Largest force exactly along the rendered direction within the continuous torques [N]."""
-    return force_along(_jacobian(point), point.direction, _torques(point, "continuous_torque_Nm"))
+    return force_along(_jacobian(point), point.direction, _joint_torques(point, "continuous_torque_Nm"))
 
 
 def acceleration_max_at(point: OperatingPoint) -> Floats:
@@ -228,7 +228,7 @@ def acceleration_max_at(point: OperatingPoint) -> Floats:
 
     Drives count as rigid.
     """
-    torques = _torques(point, "torque_limit_Nm")
+    torques = _joint_torques(point, "torque_limit_Nm")
     return acceleration_along(_jacobian(point), point.whole_mass_matrix, point.direction, torques)
 
 
@@ -248,7 +248,9 @@ def friction_force_at(point: OperatingPoint) -> Floats:
         return _check_nonzero(ground_friction(point.given_plant), "needs dry friction; give friction.coulomb_N")
     dry = point.drives.nonlinearity
     if dry is None or not np.any(dry.coulomb > 0.0):
-        raise MeasureError(f"needs dry friction; give {_key(point, 0, 'coulomb_Nm')}, or that of another drive")
+        raise MeasureError(
+            f"needs dry friction; give {_drive_key(point, 0, 'coulomb_Nm')}, or that of another drive"
+        )
     return friction_along(_jacobian(point), point.direction, point.drives.transmission * dry.coulomb)
 
 
@@ -276,8 +278,8 @@ def _jacobian(point: OperatingPoint) -> Floats:
     return np.concatenate([point.jacobian, point.posture.angular_jacobian], axis=-2)
 
 
-def _torques(point: OperatingPoint, key: str) -> Floats:
-    """Torques at the joints (..., d) [N m]. Raises MeasureError where the file leaves one out."""
+def _joint_torques(point: OperatingPoint, key: str) -> Floats:
+    """The drives' torques of this key, at the joints (..., d) [N m]. Raises MeasureError where one is left out."""
     drives = point.drives
     limits = drives.torque_limit if key == "torque_limit_Nm" else drives.continuous_torque
     known = np.full(len(drives.names), np.nan) if limits is None else limits
@@ -289,17 +291,17 @@ def _check_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
     missing = ~np.isfinite(values)
     if missing.any():
         first = int(np.argwhere(missing)[0][-1])
-        raise MeasureError(f"needs a finite {key} of every drive; give {_key(point, first, key)}")
+        raise MeasureError(f"needs a finite {key} of every drive; give {_drive_key(point, first, key)}")
     return values
 
 
 def _check_nonzero(value: float, otherwise: str) -> Floats:
-    """A number of a [plant]. Raises MeasureError, saying `otherwise`, where it is 0, as if left out."""
+    """A number of a [plant], as an array. Raises MeasureError saying `otherwise` where it is 0, left out."""
     if value == 0.0:
         raise MeasureError(otherwise)
     return np.asarray(value)
 
 
-def _key(point: OperatingPoint, drive: int, key: str) -> str:
+def _drive_key(point: OperatingPoint, drive: int, key: str) -> str:
     """Key in the device file of a number of a drive, given by its index."""
     return f"mechanism.drives.{point.drives.names[drive]}.{key}"

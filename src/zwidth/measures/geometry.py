@@ -56,6 +56,7 @@ def segment_distance(first: ArrayLike, last: ArrayLike, other_first: ArrayLike, 
     1.0
     """
     p, q, r, s = (np.asarray(end, dtype=np.float64) for end in (first, last, other_first, other_last))
+    # |w + at u - other v|^2 is least where both its derivatives are 0, two equations with these products
     u, v, w = q - p, s - r, p - r
     a, b, c, d, e = (np.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
     det = a * c - b * b
@@ -160,7 +161,9 @@ def neighbours(mechanism: Mechanism) -> set[tuple[int, int]]:
 
 
 def _joints_apart(mechanism: Mechanism, posture: Posture, i: int, j: int) -> Flags:
-    """Whether two bodies are not both on the base with their joints at one place, at each posture."""
+    """Whether two bodies, by the index of a link, can collide, at each posture (...): not where both stand on the
+    base with their joints at one place.
+    """
     parent = mechanism.links.parent
     if parent[i] >= 0 or parent[j] >= 0:
         return np.ones(posture.status.shape, dtype=np.bool_)
@@ -181,10 +184,10 @@ def link_distance(
     Raises   NoAnswerError  as `rods_of`
     """
     rods, body = rods_of(mechanism, posture), bodies(mechanism)
-    own = sorted(set(rods.link.tolist()))
+    present = sorted(set(rods.link.tolist()))
     if pairs is None:
         beside = neighbours(mechanism)
-        chosen = [(i, j) for n, i in enumerate(own) for j in own[n + 1 :] if (i, j) not in beside]
+        chosen = [(i, j) for n, i in enumerate(present) for j in present[n + 1 :] if (i, j) not in beside]
     else:
         chosen = [(int(body[i]), int(body[j])) for i, j in pairs]
     least = np.where(np.isnan(posture.position[..., 0]) | (posture.status != 0), np.nan, np.inf)
@@ -302,7 +305,7 @@ def _homogeneous(T: Floats, R: Floats) -> Floats:
     inverse = np.linalg.pinv(np.where(unknown[..., None, None], 0.0, J))
     back_T, back_R = inverse[..., :3], inverse[..., 3:]
     sizes = (np.linalg.norm(each, axis=(-2, -1)) for each in (T, R, back_T, back_R))
-    t, r, t_back, r_back = sizes
+    t, r, t_back, r_back = sizes  # |T|, |R|, |T'| and |R'| of `reciprocal_condition`
     with np.errstate(divide="ignore", invalid="ignore"):
         L = np.sqrt(t * r_back / (r * t_back))
     L = np.where(np.isfinite(L) & (L > 0.0), L, 1.0)
@@ -331,7 +334,7 @@ def link_clearance_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -
     mechanism, posture = _mechanism(point)
     (radius,) = numbers_of(wanted, point.shape, "the radius of the links", "link_radius")
     pairs = _pairs(mechanism, wanted.colliding_links)
-    with _links_of_a_length():
+    with _refusing_links_without_length():
         return np.asarray(link_distance(mechanism, posture, pairs) - 2.0 * radius)
 
 
@@ -358,12 +361,12 @@ def reach_z_at(point: OperatingPoint) -> Floats:
 def _reach(point: OperatingPoint, axes: tuple[int, ...]) -> Floats:
     """Largest distance of a point of a link from the base's middle along these axes [m]. Raises MeasureError."""
     mechanism, posture = _mechanism(point)
-    with _links_of_a_length():
+    with _refusing_links_without_length():
         return largest_distance(mechanism, posture, axes)
 
 
 @contextmanager
-def _links_of_a_length() -> Iterator[None]:
+def _refusing_links_without_length() -> Iterator[None]:
     """Within it a NoAnswerError becomes a MeasureError that says what to give where no link has a length."""
     try:
         yield
@@ -379,7 +382,7 @@ def _mechanism(point: OperatingPoint) -> tuple[Mechanism, Posture]:
 
 
 def _pairs(mechanism: Mechanism, written: tuple[str, ...] | None) -> list[tuple[int, int]] | None:
-    """Pairs of links by their names, each written as "A:B". Raises MeasureError for what is no such pair."""
+    """Pairs of links by index, of names written as "A:B"; None for None. Raises MeasureError for another text."""
     if written is None:
         return None
     index = {name: i for i, name in enumerate(mechanism.links.names)}

@@ -117,7 +117,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
         return _controlled_impedance(loop, wall_stiffness + wall_damping * w, s)
     dynamic, act, read, h = _dynamic_stiffness(plant, s)
     hold = _hold_response(loop, s)
-    P, w = _sampled(loop, s * T)
+    P, w = _sampled_responses(loop, s * T)
     C = wall_stiffness + wall_damping * w
     alias_response = P - hold * (_solve(dynamic, act) @ read)
     wall = hold * C / (1.0 + alias_response * C)
@@ -130,7 +130,7 @@ def _controlled_impedance(loop: Loop, wall: Complexes, s: Complexes) -> Complexe
     plant, T, computer = loop.plant, loop.period, loop.controller
     dynamic, act, read, h = _dynamic_stiffness(plant, s)
     z, d, hold = np.exp(s * T), np.expm1(s * T), _hold_response(loop, s)
-    sensor, ahead = computer.force_sensor, computer.feedforward
+    sensor, feedforward = computer.force_sensor, computer.feedforward
     P, P_f = path_responses(plant, computer, d)
     pushed = _solve(dynamic, act)
     G, lost = np.zeros_like(s), np.zeros_like(s)  # G, and m w^2
@@ -139,8 +139,9 @@ def _controlled_impedance(loop: Loop, wall: Complexes, s: Complexes) -> Complexe
         G = sensor_response(sensor, T, d)
         law = wall * (1.0 + G) if sensor.law == "force-error" else wall
         G, lost = G / z**sensor.delay, -sensor.mass_beyond * s**2
-    if ahead is not None:
-        law = law - feedforward_response(ahead, T, z, d)
+    if feedforward is not None:
+        law = law - feedforward_response(feedforward, T, z, d)
+    # S, S_f, H/N, and the vectors A s - G m w^2 h and h + H G/N a of the derivation above
     alias = P - hold * (pushed @ read)
     alias_f = P_f - hold * lost * (pushed @ h)
     share = hold / (1.0 + alias * law - alias_f * G)
@@ -203,7 +204,9 @@ def static_stiffness(plant: Plant, wall_stiffness: ArrayLike, controller: Contro
 
 
 def _static_gains(controller: Controller | None) -> tuple[float, bool, float]:
-    """Force commanded per hand force at rest, whether it is of the force error, and the local loop's spring."""
+    """What acts at rest: force commanded per hand force, whether it is of the force error, and the local loop's
+    stiffness [N/m]; 0, False and 0 for None.
+    """
     sensor = None if controller is None else controller.force_sensor
     local = None if controller is None else controller.local_loop
     gain, error = (0.0, False) if sensor is None else (float(sensor.gain), sensor.law == "force-error")
@@ -252,14 +255,14 @@ def free_motion_mass(plant: Plant, controller: Controller | None = None) -> floa
     if not float(h @ h) > FREE * float(modal_handle @ modal_handle):
         return float("nan")
     sensor = None if controller is None else controller.force_sensor
-    ahead = None if controller is None else controller.feedforward
-    # x'' = push f + act (inertia read x'' - gain mass_beyond h x''), in the rigid modes
+    feedforward = None if controller is None else controller.feedforward
+    # x'' = (h + gain act) f + act (inertia read x'' - gain mass_beyond h x''), in the rigid modes
     gain, beyond = (0.0, 0.0) if sensor is None else (sensor.gain, sensor.mass_beyond)
-    inertia = 0.0 if ahead is None else ahead.inertia
+    inertia = 0.0 if feedforward is None else feedforward.inertia
     if not (gain or inertia):
         return 1.0 / float(h @ h)
-    own = np.eye(len(h)) - np.outer(act, inertia * read - gain * beyond * h)
-    return 1.0 / float(h @ np.linalg.solve(own, h + gain * act))
+    modal_mass = np.eye(len(h)) - np.outer(act, inertia * read - gain * beyond * h)
+    return 1.0 / float(h @ np.linalg.solve(modal_mass, h + gain * act))
 
 
 def handle_of(plant: Plant) -> Floats:
@@ -273,11 +276,13 @@ def handle_of(plant: Plant) -> Floats:
 
 
 def _dynamic_stiffness(plant: Plant, s: Complexes | Floats) -> tuple[Any, Floats, Floats, Floats]:
-    """D(s) (..., n, n) with actuator, sensor and handle in modal coordinates, where the rigid modes have no
-    stiffness at all: at low frequency nothing else is left of them."""
+    """Dynamic stiffness D(s) (..., n, n), then actuator, sensor and handle (n,), all in modal coordinates.
+
+    There the rigid modes have no stiffness at all: at low frequency nothing else is left of them.
+    """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    own = s[..., None, None] ** 2 * np.eye(plant.size) + np.diag(squared)
-    dynamic = own + s[..., None, None] * (shapes.T @ plant.damping @ shapes)
+    undamped = s[..., None, None] ** 2 * np.eye(plant.size) + np.diag(squared)
+    dynamic = undamped + s[..., None, None] * (shapes.T @ plant.damping @ shapes)
     for damper in plant.lagged_dampers:
         along = shapes.T @ damper.along
         lagged = damper.damping * s / (1.0 + s * damper.time_constant)
@@ -302,7 +307,7 @@ def _hold_response(loop: Loop, s: Complexes) -> Complexes:
     return np.asarray(filtered * stairs / (1.0 + s * controller.actuator_time_constant))
 
 
-def _sampled(loop: Loop, log_z: Complexes) -> tuple[Complexes, Complexes]:
+def _sampled_responses(loop: Loop, log_z: Complexes) -> tuple[Complexes, Complexes]:
     """Responses of the sampled plant, P [m/N], and of the velocity estimate, w [1/s], at z = exp(log_z) (...)."""
     z, d = np.exp(log_z), np.expm1(log_z)
     return loop.plant_response(z, d), loop.velocity_response(z, d)
@@ -329,7 +334,7 @@ class RestCompliance:
     is_held   False where a push of the hand moves the handle away without end, whatever K is
     held      that of a wall that holds the sensor still; of any wall, where it moves the handle in no other way
               [m/N]
-    exchange  q g above
+    exchange  q g above [1]
     sensor    c above, of the sensor under a force at the actuator [m/N]; inf for a free motion
     sliding   of a wall whose force does not move its own sensor but moves the handle [(m/N)^2]
     """
@@ -372,6 +377,7 @@ def rest_compliance(plant: Plant, handle: Floats, gain: float = 0.0) -> RestComp
     gain  force at the actuator per newton of the hand, by a force sensor
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    # letters as in the derivation above
     h, a, s = shapes.T @ handle, shapes.T @ plant.actuator, shapes.T @ plant.sensor
     free = squared == 0.0
     spring = np.where(free, np.inf, squared)
@@ -384,9 +390,10 @@ def rest_compliance(plant: Plant, handle: Floats, gain: float = 0.0) -> RestComp
         return RestCompliance(True, _held(h, s, a, g, q, spring), (q + gain) * g, np.inf)
     if np.any(free_h):  # no wall force acts along the free motion that it is read from
         return RestCompliance(False)
-    by_force, read_push, c = _sum(h, a, spring), _sum(s, h, spring), _sum(s, a, spring)
+    # motion of the handle by the wall's force, of the sensor by the hand's, and of the sensor by the wall's
+    by_force, read_push, c = _modal_sum(h, a, spring), _modal_sum(s, h, spring), _modal_sum(s, a, spring)
     if c == 0.0:
-        return RestCompliance(True, _sum(h, h, spring) + gain * by_force, sliding=-by_force * read_push)
+        return RestCompliance(True, _modal_sum(h, h, spring) + gain * by_force, sliding=-by_force * read_push)
     g, q = by_force / c, read_push / c
     return RestCompliance(True, _held(h, s, a, g, q, spring), (q + gain) * g, c)
 
@@ -398,15 +405,19 @@ def _free_part(vector: Floats, free: Flags) -> Floats:
 
 
 def _slips(h: Floats, s: Floats, a: Floats, g: float, q: float) -> bool:
-    """Whether the handle h moves along free motions while the wall, acting along a, holds the sensor s; (n,)."""
+    """Whether the handle h moves along free motions while the wall, acting along a, holds the sensor s; all (n,).
+
+    g, q  as in the derivation above: the handle is held where (h - g s).(h - q a) is 0
+    """
     left, right = h - g * s, h - q * a
+    # `difference`: relative difference of the handle's free motion from the one that the wall holds
     slip, size = float(left @ right), float(np.linalg.norm(left) * np.linalg.norm(right))
-    own = float(np.linalg.norm(h))
-    same = min(
-        float(np.linalg.norm(left)) / max(own, abs(g) * float(np.linalg.norm(s)), np.finfo(float).tiny),
-        float(np.linalg.norm(right)) / max(own, abs(q) * float(np.linalg.norm(a)), np.finfo(float).tiny),
+    length = float(np.linalg.norm(h))
+    difference = min(
+        float(np.linalg.norm(left)) / max(length, abs(g) * float(np.linalg.norm(s)), np.finfo(float).tiny),
+        float(np.linalg.norm(right)) / max(length, abs(q) * float(np.linalg.norm(a)), np.finfo(float).tiny),
     )
-    return same > UNHELD and abs(slip) > ROUNDING * size
+    return difference > UNHELD and abs(slip) > ROUNDING * size
 
 
 def _held(h: Floats, s: Floats, a: Floats, g: float, q: float, spring: Floats) -> float:
@@ -417,7 +428,7 @@ def _held(h: Floats, s: Floats, a: Floats, g: float, q: float, spring: Floats) -
     left, right = _difference(h, g * s), _difference(h, q * a)
     of_left, of_right = np.maximum(np.abs(h), np.abs(g * s)), np.maximum(np.abs(h), np.abs(q * a))
     blur = OF_MODES * float(np.sum((of_left * np.abs(right) + np.abs(left) * of_right) / spring))
-    total = _sum(left, right, spring)
+    total = _modal_sum(left, right, spring)
     return total if abs(total) > blur else 0.0
 
 
@@ -429,8 +440,8 @@ def _difference(vector: Floats, other: Floats) -> Floats:
     return np.where(np.abs(difference) <= ROUNDING * np.maximum(longest, size), 0.0, difference)
 
 
-def _sum(left: Floats, right: Floats, spring: Floats) -> float:
-    """sum of left right/spring, 0 where that is rounding of its terms."""
+def _modal_sum(left: Floats, right: Floats, spring: Floats) -> float:
+    """Sum over the modes of left right/spring, 0 where that is rounding of its terms; spring  w^2, inf if free."""
     terms = left * right / spring
     total = float(np.sum(terms))
     return total if abs(total) > ROUNDING * float(np.sum(np.abs(terms))) else 0.0

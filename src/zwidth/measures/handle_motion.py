@@ -60,7 +60,7 @@ class HandleMotion:
 
     table    their loops
     modes    their modes
-    known    (N,)  which devices are known in this form; the others are to be asked alone
+    known    (N,)  which devices have a table and modes in this form; the others must be computed one by one
     period   (N,)  T [s]
     controller  of all of them, numbers of several designs (N,)
     """
@@ -73,7 +73,7 @@ class HandleMotion:
 
     @classmethod
     def of(cls, point: OperatingPoint) -> HandleMotion | None:
-        """The devices at all points, flat; None where each is to be asked alone."""
+        """The devices at all N points; None where each must be computed by itself."""
         free = point.without_operator
         if not point.shape or free.controller.fixed_feedback:
             return None
@@ -92,34 +92,37 @@ class HandleMotion:
         rows       (n,)    which devices, of those known
         frequency  (n, f)  above 0 and below half the sampling frequency [Hz]
         K, B       (n,)    of the wall [N/m], [N s/m]
-        Returns    (n, f) twice  [m/N]
+        Returns    (n, f) twice  without a wall, with it [m/N]
         """
         parts = [
-            self._some(rows[first : first + AT_ONCE], frequency[first : first + AT_ONCE])
+            self._wall_loop_parts(rows[first : first + AT_ONCE], frequency[first : first + AT_ONCE])
             for first in range(0, max(len(rows), 1), AT_ONCE)
         ]
         G, through, P, w, H = (np.concatenate(each) for each in zip(*parts, strict=True))
         C = K[:, None] + B[:, None] * w
         return G, G - H * C * through / (1.0 + P * C)
 
-    def _some(self, rows: Ints, frequency: Floats) -> tuple[Complexes, ...]:
+    def _wall_loop_parts(self, rows: Ints, frequency: Floats) -> tuple[Complexes, ...]:
         """G_hh, G_ha G_sh, P, w and H (see above), each (n, f), of devices (n,) at frequencies (n, f) [Hz]."""
         T = self.period[rows][:, None]
         s: Complexes = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
         G_hh, G_ha, G_sh = self._responses(rows, s)
         P, w = (np.empty(frequency.shape, dtype=complex) for _ in range(2))
-        _sampled(self.table, rows, 2.0 * np.pi * frequency * T, factor_memory(self.table), P, w)
+        _sampled_responses(self.table, rows, 2.0 * np.pi * frequency * T, factor_memory(self.table), P, w)
         return G_hh, G_ha * G_sh, P, w, self._hold(rows, s)
 
     def _responses(self, rows: Ints, s: Complexes) -> tuple[Complexes, ...]:
-        """Responses G_hh, G_ha and G_sh (n, f) [m/N] of devices (n,) at s = jw (n, f)."""
+        """Responses G_hh, G_ha and G_sh (n, f) [m/N] of devices (n,) at s = jw (n, f), by their modes."""
         modes = self.modes.rows(rows)
         h, a, y = modes.handle, modes.input, modes.output
-        own = s[..., None] ** 2 + 2.0 * modes.decay[:, None] * s[..., None] + modes.frequency_squared[:, None]
+        stiffness = (
+            s[..., None] ** 2 + 2.0 * modes.decay[:, None] * s[..., None] + modes.frequency_squared[:, None]
+        )
         # a mode that does not move has no number either where its frequency is filled up with 0
-        G = [np.sum((one * other)[:, None] / own, axis=-1) for one, other in ((h, h), (h, a), (y, h))]
+        G = [np.sum((one * other)[:, None] / stiffness, axis=-1) for one, other in ((h, h), (h, a), (y, h))]
         if modes.coupled is None or modes.drag is None or not modes.coupled.any():
             return tuple(G)
+        # devices whose damping couples modes: with all of D, excited at the handle (column 0) and the actuator (1)
         some = np.flatnonzero(modes.coupled)
         m = h.shape[1]
         D = s[some][..., None, None] * modes.drag[some][:, None]
@@ -166,10 +169,14 @@ class HandleMotion:
 
 
 @compiled
-def _sampled(
+def _sampled_responses(
     loops: LoopTable, rows: Ints, theta: Floats, circle: CircleFactors, P: Complexes, w: Complexes
 ) -> None:
-    """Sampled plants P, delay and force path included, and velocity estimates w at z = exp(i theta)."""
+    """Fill P and w (n, f) with the responses of sampled plants, delay and force path included, and of velocity
+    estimates, at z = exp(i theta), theta (n, f) [rad].
+
+    rows  (n,)  which loops;   circle  working memory
+    """
     circle.sizes[COMPUTER] = -1
     for n in range(len(rows)):
         i = rows[n]
@@ -177,7 +184,9 @@ def _sampled(
             fill_computer(loops, loops.computer[i], 1.0, circle)
         fill_plant(loops, i, circle)
         for k in range(theta.shape[1]):
+            # squares and product of cosine and sine of half the angle
             cc, ss, sc = half_angle(np.tan(0.5 * theta[n, k]))
+            # numerators and denominators of -1/P and w
             X, _, N, _ = minus_inverse_plant(circle, cc, ss, sc)
             Y, _, Q, _ = velocity_on_circle(circle, cc, ss, sc)
             P[n, k] = -N / X
@@ -212,7 +221,8 @@ def frequencies_in_band(
     order = np.argsort(modes.frequency_squared, axis=1, kind="stable")
     h2 = np.take_along_axis(modes.handle**2, order, axis=1)
     wide = np.max(np.abs(modes.decay), axis=1, keepdims=True)
-    places = np.concatenate([np.sqrt(np.maximum(w2, 0.0)), *_zeros(w2, h2)], axis=1)
+    # resonances and antiresonances [rad/s], and with those of the loop all centres and their half widths
+    places = np.concatenate([np.sqrt(np.maximum(w2, 0.0)), *_antiresonances(w2, h2)], axis=1)
     size = np.clip(np.abs(roots), 1e-3, 1.0)
     centres = np.concatenate([places, np.abs(np.angle(roots)) / period[:, None]], axis=1)
     wide = np.concatenate([wide + 0.0 * places, -np.log(size) / period[:, None]], axis=1)
@@ -222,7 +232,7 @@ def frequencies_in_band(
     return np.sort(every, axis=1)
 
 
-def _zeros(w2: Floats, h2: Floats) -> list[Floats]:
+def _antiresonances(w2: Floats, h2: Floats) -> list[Floats]:
     """Antiresonances (n, 1) between neighbouring resonances [rad/s], by halving: the sum rises between them.
 
     w2, h2  (n, m)  squared resonances, ascending, and squared shares of the handle in these modes
@@ -252,6 +262,7 @@ def least_in_band(response: Callable[[Floats], Floats], frequency: Floats) -> Fl
     least = values.min(axis=1)
     ends = np.full((len(values), 1), np.inf)
     before, after = np.hstack([ends, values[:, :-1]]), np.hstack([values[:, 1:], ends])
+    # a minimum is no larger than its neighbours; the deepest DEEPEST of them are refined
     minima = np.where((values <= before) & (values <= after), values, np.inf)
     chosen = np.argsort(minima, axis=1, kind="stable")[:, :DEEPEST]
     last, row = frequency.shape[1] - 1, np.arange(len(values))
@@ -371,7 +382,7 @@ def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
         if peak is None:
             raise NoValueError(NO_WALL_DECAYS)
         band = float(low[at]), _below_half(float(high[at]), float(loop.period))
-        return _ratio_alone(loop, peak.stiffness, peak.damping, *band)
+        return _least_ratio_of_loop(loop, peak.stiffness, peak.damping, *band)
 
     motion, numbers = HandleMotion.of(point), numbers_of_points(point, STIFFEST, radius)
     if motion is None or numbers is None:
@@ -400,7 +411,7 @@ def _below_half(frequency: float, period: float) -> float:
     return min(frequency, HIGHEST / period)
 
 
-def _ratio_alone(loop: Loop, K: float, B: float, low: float, high: float) -> float:
+def _least_ratio_of_loop(loop: Loop, K: float, B: float, low: float, high: float) -> float:
     """Least impedance ratio of one loop on a wall K [N/m], B [N s/m] over a band [Hz], tried at many frequencies:
     its modes may have no real form."""
     roots = eigenvalues(loop, K, B).ravel()
@@ -418,8 +429,9 @@ def _ratio_alone(loop: Loop, K: float, B: float, low: float, high: float) -> flo
 
 
 def _check_frequencies(point: OperatingPoint, frequency: Floats) -> Callable[[Index], None]:
-    """A function that refuses a frequency at or above half the sampling frequency at an index.
+    """A function of an index that raises NoValueError where the frequency (...) [Hz] there is too high.
 
+    Too high is at or above half the sampling frequency.
     Raises  MeasureError  where that is so at all points
     """
     half = np.broadcast_to(0.5 / np.asarray(point.controller.sampling_period, dtype=np.float64), point.shape)
@@ -440,8 +452,8 @@ def _check_frequencies(point: OperatingPoint, frequency: Floats) -> Callable[[In
 
 
 def _check_band(point: OperatingPoint, low: Floats, high: Floats) -> None:
-    """Raises MeasureError for a band whose ends are in the wrong order, or that begins beyond half the sampling
-    frequency."""
+    """Raise MeasureError for a band [Hz] whose ends are in the wrong order, or that begins beyond half the
+    sampling frequency."""
     half = HIGHEST / np.asarray(point.controller.sampling_period, dtype=np.float64)
     if np.any(high <= low):
         raise MeasureError(

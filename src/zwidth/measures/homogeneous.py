@@ -80,11 +80,11 @@ def characteristic_length(
     """
     J = np.asarray(jacobian, dtype=np.float64)
     power = _powers(J, rotations, prismatic)
-    _check(J, power)
+    _check_single_minimum(J, power)
     unknown: Flags = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     J = np.where(unknown[..., None, None], np.eye(*J.shape[-2:]), J)
     values = np.linalg.svd(J, compute_uv=False)
-    start = _start(J, power)
+    start = _first_log_length(J, power)
     kappa = _condition(J, power, start)
     singular = ~(kappa < 1.0 / (np.finfo(float).eps * max(J.shape[-2:]))) | (values[..., -1] == 0.0)
     J = np.where(singular[..., None, None], np.eye(*J.shape[-2:]), J)
@@ -122,7 +122,7 @@ def scaled_jacobian(jacobian: ArrayLike, largest_velocities: ArrayLike, largest_
 
 
 def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Floats:
-    """Power of the length by which each entry is multiplied, (m, n)."""
+    """Exponent of the length in the factor of each entry (m, n): -1, 0 or 1."""
     if J.ndim < 2:
         raise ValueError(f"a Jacobian is a matrix, got an array of shape {J.shape}")
     for name, indices, count in (("rotations", rotations, J.shape[-2]), ("prismatic", prismatic, J.shape[-1])):
@@ -136,7 +136,7 @@ def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Fl
     return power
 
 
-def _check(J: Floats, power: Floats) -> None:
+def _check_single_minimum(J: Floats, power: Floats) -> None:
     """Raise ValueError where the length has no effect, or where the minimum may not be unique."""
     m, n = power.shape
     rows, columns = bool(np.ptp(power[:, 0])), bool(np.ptp(power[0]))
@@ -151,12 +151,13 @@ def _check(J: Floats, power: Floats) -> None:
         )
 
 
-def _start(J: Floats, power: Floats) -> Floats:
+def _first_log_length(J: Floats, power: Floats) -> Floats:
     """Logarithm of a first length: the one at which two kinds of entries have equal norms."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = [
             np.log(np.sqrt(np.sum(np.where(power == k, J, 0.0) ** 2, axis=(-2, -1)))) for k in (-1.0, 0.0, 1.0)
         ]
+        # `size`: logarithms of the norms of the entries with powers -1, 0 and 1
         candidates = np.stack([size[0] - size[1], size[1] - size[2], 0.5 * (size[0] - size[2])])
     known = np.isfinite(candidates)
     first = np.take_along_axis(candidates, known.argmax(axis=0)[None], axis=0)[0]
@@ -186,7 +187,9 @@ def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
 
 
 def _minimise_convex(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
-    """Minima of convex functions (...), found by their slopes; nan where a function does not rise in the bracket.
+    """Minima (...) of convex functions, found by their slopes; nan where a function does not rise in the bracket.
+
+    slope  slopes (...) at places (...);   start  (...)  places about which brackets are widened
 
     Kinks and level stretches are treated alike: the place up to which the slope is below -FLAT and the one from
     which it exceeds FLAT are bisected for, and the answer lies in their middle. So rounding of a slope that is all

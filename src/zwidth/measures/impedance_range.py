@@ -58,42 +58,46 @@ def stiffness_max_with_margins_at(point: OperatingPoint, wanted: WantedWall | Wa
         stiffness, damping, delay = (float(margin[at]) for margin in margins)
         loop, count = point[at].loop, delays_within(delay)
         computer = loop.controller
-        own = float(computer.delay)
+        present = float(computer.delay)
         loops = [
-            Loop(loop.plant, replace(computer, delay=own + share * delay))
+            Loop(loop.plant, replace(computer, delay=present + share * delay))
             for share in np.linspace(0.0, 1.0, count)
         ]
-        found = stiffness_with_margins_alone(loops, stiffness, damping)
-        if found is None:
+        wall = stiffness_with_margins_alone(loops, stiffness, damping)
+        if wall is None:
             raise NoValueError(NONE_STABLE_WITH_MARGINS)
-        return found[0]
+        return wall[0]
 
-    together = _together(point, *(margin.ravel() for margin in margins))
+    together = _stiffness_with_margins(point, *(margin.ravel() for margin in margins))
     if together is None:
         return complete_pointwise(np.full(point.shape, np.nan), alone, point)
     return complete_charts(point, *together, alone, NONE_STABLE_WITH_MARGINS)
 
 
-def _together(
+def _stiffness_with_margins(
     point: OperatingPoint, stiffness: Floats, damping: Floats, delay: Floats
 ) -> tuple[Floats, NDArray[np.uint8]] | None:
-    """Stiffnesses and statuses of all points, flat; None where compiled code cannot treat any of them."""
+    """Stiffnesses [N/m] and statuses of all N points; None where compiled code cannot treat any of them.
+
+    stiffness, damping, delay  (N,)  margins: two shares, and samples
+    """
     values, status = np.full(delay.size, np.nan), np.full(delay.size, DOUBTFUL, dtype=np.uint8)
+    # number of delays tried within each margin, and so at each point
     each = np.array([delays_within(one) for one in np.unique(delay)])
     counts = each[np.unique(delay, return_inverse=True)[1].ravel()]
     for at, piece in pieces_of_points(point):
         rows = np.arange(delay.size)[at]
         for count in np.unique(counts[rows]):
             some = np.flatnonzero(counts[rows] == count)
-            own = piece if len(some) == len(rows) else piece.flat[some]
+            points = piece if len(some) == len(rows) else piece.flat[some]
             margin = delay[rows[some]]
             alike = bool((margin == margin[0]).all())
-            own, longer = (own, margin[0]) if alike else (own.flat, margin)
-            controller = own.controller
+            points, longer = (points, margin[0]) if alike else (points.flat, margin)
+            controller = points.controller
             first = np.asarray(controller.delay)
             delays = [first + share * longer for share in np.linspace(0.0, 1.0, int(count))]
             computers = [replace(controller, delay=d if d.ndim else float(d)) for d in delays]
-            tables = tables_of_points(own, computers)
+            tables = tables_of_points(points, computers)
             if tables is None:
                 return None
             at_rows = rows[some]
@@ -191,7 +195,7 @@ def _positive(values: Floats) -> Flags:
 
 
 def _masked_range(applies: Flags, *numbers: Floats) -> ImpedanceRange:
-    """Range of these numbers, in the order of its fields; nan where the closed form does not apply."""
+    """Range of these numbers (...), in the order of its fields; nan where the closed form does not apply."""
     return ImpedanceRange(*(np.where(applies, number, np.nan) for number in numbers))
 
 
@@ -203,7 +207,7 @@ NONE_DECAYS: Final = "no wall with K > 0 and B >= 0 has a spectral radius below 
 
 def stiffness_max_at(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the points' models and loops [N/m]."""
-    return _computed(point, STIFFEST, "stiffness", _stiffness_max_at, NONE_STABLE)
+    return _chart_number(point, STIFFEST, "stiffness", _stiffness_max_at, NONE_STABLE)
 
 
 def stiffness_max_decaying_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
@@ -226,30 +230,31 @@ def stiffness_max_decaying_at(point: OperatingPoint, wanted: WantedWall | Wanted
 
 def damping_max_at(point: OperatingPoint) -> MeasureValues:
     """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of the points [N s/m]; 0 if none is."""
-    return _computed(point, ALL_NUMBERS, "largest_damping", _damping_max_at)
+    return _chart_number(point, ALL_NUMBERS, "largest_damping", _damping_max_at)
 
 
 def stable_area_at(point: OperatingPoint) -> MeasureValues:
     """Area of the stable walls with K >= 0, B >= 0 of the points [N² s/m²]."""
-    return _computed(point, ALL_NUMBERS, "area", _stable_area_at)
+    return _chart_number(point, ALL_NUMBERS, "area", _stable_area_at)
 
 
 def fastest_decay_at(point: OperatingPoint) -> MeasureValues:
     """Spectral radius of the wall whose slowest motion decays fastest, of the points."""
-    return _computed(point, DECAY, "spectral_radius", _fastest_decay_at, "no wall is stable")
+    return _chart_number(point, DECAY, "spectral_radius", _fastest_decay_at, "no wall is stable")
 
 
-def _computed(
+def _chart_number(
     point: OperatingPoint,
     what: int,
     number: str,
     alone: Callable[[OperatingPoint], float],
     none_stable: str = "",
 ) -> MeasureValues:
-    """A number of all points' charts, computed together (`chart.point_chart`), and of a point in doubt, or of a
-    device whose modes are not in that form, by the chart of each alone.
+    """A number of the chart of each point, computed together (`chart.point_chart`); for a point in doubt, and for
+    all where the modes are not in that form, by a chart of its own.
 
-    what         what of the charts is computed;   number  attribute of `ChartNumbers`;   alone  of a single point
+    what         STIFFEST, DECAY or ALL_NUMBERS: what of the charts is computed
+    number       attribute of `ChartNumbers` that is returned;   alone  computes it at a single point
     none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
     """
     numbers = numbers_of_points(point, what)
@@ -285,25 +290,25 @@ def _fastest_decay_at(point: OperatingPoint) -> float:
     return wall.spectral_radius
 
 
-_NONE = "no wall of positive stiffness is stable, or the mass or the spring of the model is not there"
+_NO_CLOSED_FORM = "no wall of positive stiffness is stable, or the mass or the spring of the model is not there"
 
 
 def stiffness_max_closed_form_at(point: OperatingPoint) -> MeasureValues:
     """Largest stiffness in closed form [N/m] (thesis eq. 5.4, 5.6 and 5.7)."""
-    return with_status(point, _range(point).stiffness_max, _NONE)
+    return with_status(point, _closed_form_range(point).stiffness_max, _NO_CLOSED_FORM)
 
 
 def damping_max_closed_form_at(point: OperatingPoint) -> MeasureValues:
     """Largest damping for stiffnesses near 0 in closed form [N s/m] (thesis eq. 5.4, 5.6 and 5.7)."""
-    return with_status(point, _range(point).damping_max, _NONE)
+    return with_status(point, _closed_form_range(point).damping_max, _NO_CLOSED_FORM)
 
 
 def stable_area_closed_form_at(point: OperatingPoint) -> MeasureValues:
     """Stable area in closed form [N² s/m²] (thesis eq. 5.5 and 5.8)."""
-    return with_status(point, _range(point).stable_area, _NONE)
+    return with_status(point, _closed_form_range(point).stable_area, _NO_CLOSED_FORM)
 
 
-def _range(point: OperatingPoint) -> ImpedanceRange:
+def _closed_form_range(point: OperatingPoint) -> ImpedanceRange:
     """Range in closed form at all points: of a rigid mass, or of the motor side on the structure's spring.
 
     Raises  MeasureError  for another model, or one that breaks what the closed form assumes

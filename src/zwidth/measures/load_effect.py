@@ -58,7 +58,7 @@ def fastest_sideways_motion(point: OperatingPoint) -> SidewaysMotion | None:
     # a reduced model has the rendered direction alone
     whole = point.plant if point.mechanism is None else point.in_model("full").plant
     free = moved_motions(whole)[1].squared == 0.0
-    return SidewaysMotion(0.0, 0.0) if np.any(free) else None
+    return SidewaysMotion(0.0, 0.0) if np.any(free) else None  # neutral: it neither grows nor swings
 
 
 def load_change_at(point: OperatingPoint) -> float:

@@ -22,7 +22,7 @@ UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), n
 
 
 def wall_of(wanted: WantedWall) -> tuple[float, float]:
-    """Stiffness and damping of the wanted wall. Raises MeasureError where it is not given."""
+    """Stiffness [N/m] and damping [N s/m] of the wanted wall. Raises MeasureError where it is not given."""
     K, B = wanted.stiffness, wanted.damping
     if K is None or B is None:
         raise MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)])
@@ -30,7 +30,10 @@ def wall_of(wanted: WantedWall) -> tuple[float, float]:
 
 
 def walls_of(wanted: WantedWall | WantedWalls, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
-    """Stiffness and damping of the wall at each of many points. Raises MeasureError where they are not given."""
+    """Stiffness [N/m] and damping [N s/m] of the wall at each of many points (...), by their shape.
+
+    Raises  MeasureError  where they are not given
+    """
     K, B = numbers_of(wanted, shape, "a wanted wall", "stiffness", "damping")
     return K, B
 
@@ -38,7 +41,7 @@ def walls_of(wanted: WantedWall | WantedWalls, shape: tuple[int, ...]) -> tuple[
 def numbers_of(
     wanted: WantedWall | WantedWalls, shape: tuple[int, ...], what: str, *names: str
 ) -> tuple[Floats, ...]:
-    """Numbers by their names, each at every one of many points (...).
+    """Numbers of the wanted wall by their names, each as an array over many points (...), by their shape.
 
     what    what the measure needs them for, such as "a wanted wall"
     Raises  MeasureError  where one is not given, or not allowed
@@ -89,7 +92,7 @@ def loop_case(point: OperatingPoint) -> ConditionCase:
 
 
 def check_assumptions(case: ConditionCase, *more: str) -> None:
-    """Raises MeasureError, in words, where a loop breaks an assumption of the closed forms, or one of `more`.
+    """Raise MeasureError where a loop breaks an assumption of the closed forms, or one of `more`, each a sentence.
 
     Closed forms assume the velocity by backward difference and the force as computed; their assumption that
     nothing is damped is not checked.

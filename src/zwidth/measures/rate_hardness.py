@@ -65,14 +65,14 @@ def rate_hardness(
     of_modes = some.frequency_squared, drag, some.handle, some.input, some.output
 
     def several(first: int, last: int) -> None:
-        _several(loops, rows, *of_modes, delay[rows], lag[rows], lagging, K, B, out, first, last)
+        _fill_steepest_rates(loops, rows, *of_modes, delay[rows], lag[rows], lagging, K, B, out, first, last)
 
     in_chunks(several, len(rows))
-    return np.maximum(out, _static(some, K))
+    return np.maximum(out, _stiffness_at_rest(some, K))
 
 
-def _static(modes: RenderedModes, K: Floats) -> Floats:
-    """Felt stiffness at rest (n,), which the mean rate approaches: 1/(h^T (W + K a s^T)^-1 h)."""
+def _stiffness_at_rest(modes: RenderedModes, K: Floats) -> Floats:
+    """Felt stiffness at rest (n,) [N/m], which the mean rate approaches: 1/(h^T (W + K a s^T)^-1 h)."""
     w2, h, a, s = modes.frequency_squared, modes.handle, modes.input, modes.output
     still = (w2 == 0.0) & (h == 0.0) & (a == 0.0) & (s == 0.0)  # filled up, of a plant with fewer modes
     whole = (
@@ -86,7 +86,7 @@ def _static(modes: RenderedModes, K: Floats) -> Floats:
 
 
 @compiled
-def _several(
+def _fill_steepest_rates(
     loops: LoopTable,
     rows: Ints,
     w2: Floats,
@@ -103,7 +103,12 @@ def _several(
     first: int,
     last: int,
 ) -> None:
-    """Fill out[first:last] with the steepest mean rates of these devices, one after the other."""
+    """Fill out[first:last] with the steepest mean rates of devices `rows`, one after the other [N/m].
+
+    w2, drag, h, a, s  (n, ...)  W, D, handle, actuator and sensor of their modes, see the module
+    delay, lag         (n,)  [samples], [s];   lagging  1 where the lag is the last factor of the loops' force path
+    K, B               (n,)  of the walls
+    """
     m = w2.shape[1]
     n = 2 * m + 2
     A, E, F = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
@@ -113,14 +118,15 @@ def _several(
     memory = np.empty((loops.velocity.shape[1] + loops.force.shape[1] + 1, 2))
     for k in range(first, last):
         c = loops.computer[rows[k]]
-        own = w2[k], drag[k], h[k], a[k], s[k]
-        out[k] = _steepest(
-            loops, c, own, delay[k], lag[k], lagging, K[k], B[k], A, E, F, work, state, after, queue, past, memory
+        modes = w2[k], drag[k], h[k], a[k], s[k]
+        out[k] = _steepest_rate(
+            loops, c, modes, delay[k], lag[k], lagging, K[k], B[k],
+            A, E, F, work, state, after, queue, past, memory,
         )  # fmt: skip
 
 
 @compiled_apart
-def _steepest(
+def _steepest_rate(
     loops: LoopTable,
     c: int,
     modes: tuple[Floats, Floats, Floats, Floats, Floats],
@@ -139,11 +145,17 @@ def _steepest(
     past: Floats,
     memory: Floats,
 ) -> float:
-    """The steepest mean rate of one device [N/m], v = 1; `modes` as w2, drag, h, a and s."""
+    """The steepest mean rate of one device with computer c [N/m], v = 1.
+
+    modes  w2, drag, h, a and s, as of `_fill_steepest_rates`, which also has delay, lag and lagging
+    A, E, F, work, state, after, queue, past, memory  working memory: the generator, its exponentials over an early
+           and a late piece, room, the state and the next one, commands, readings, and states of the filters
+    """
     w2, drag, h, a, s = modes
     m, T = len(w2), loops.period[c]
     whole = loops.whole_delay[c]
     fraction = max(delay - whole, 0.0) if loops.split[c] else 0.0
+    # hh: h.h;   moved, read: h.h and h.s of the free motions;   slowest, fastest: rates of the others [rad/s]
     hh, moved, read, slowest, fastest = 0.0, 0.0, 0.0, np.inf, 0.0
     for k in range(m):
         hh += h[k] * h[k]
@@ -154,48 +166,52 @@ def _steepest(
             slowest, fastest = min(slowest, np.sqrt(abs(w2[k]))), max(fastest, np.sqrt(abs(w2[k])))
     if not moved > 1e-12 * hh:
         return np.nan
-    ratio = read / moved
+    ratio = read / moved  # r: the sensor's motion per motion of the handle
     samples = LEAST_SAMPLES
     if slowest < np.inf:
         samples = max(samples, min(MOST_SAMPLES, int(PERIODS * 2.0 * np.pi / (slowest * T)) + 1))
     if lag > 0.0:
         fastest = max(fastest, 1.0 / lag)
     pieces = min(FINEST, 1 + int(2.0 * FINEST * fastest * T / np.pi))
-    _generator(w2, drag, h, a, hh, lag, A)
+    _fill_generator(w2, drag, h, a, hh, lag, A)
     early, late = (1.0 - fraction) * T / pieces, fraction * T / pieces
     _exponential(A, early, m, E, work)
     if fraction > 0.0:
         _exponential(A, late, m, F, work)
     state[:], past[:], memory[:, :], queue[:] = 0.0, 0.0, 0.0, 0.0
     steepest = 0.0
-    # up to the first sample after the contact nothing pushes
+    # up to the first sample after the contact nothing pushes; from a sample on the old command acts for the pieces
+    # of length `late`, then the new one for those of length `early`
     for k in range(1, samples + 1):
         y = 0.0
         for j in range(m):
             y += s[j] * state[j]
-        speed = ratio + _estimate(loops, c, y, past, memory)
-        force = -_filtered(loops, c, lagging, K * (ratio * k * T + y) + B * speed, memory)
+        speed = ratio + _velocity_estimate(loops, c, y, past, memory)
+        force = -_filtered_command(loops, c, lagging, K * (ratio * k * T + y) + B * speed, memory)
         for j in range(whole, 0, -1):
             queue[j] = queue[j - 1]
         queue[0] = force
         for piece in range(pieces if fraction > 0.0 else 0):
-            _step(F, state, after)
-            steepest = max(steepest, _force(w2, drag, h, a, hh, state) / (k * T + (piece + 1) * late))
+            _advance(F, state, after)
+            steepest = max(steepest, _felt_force(w2, drag, h, a, hh, state) / (k * T + (piece + 1) * late))
         state[2 * m + 1] = queue[whole]
         if lag == 0.0:
             state[2 * m] = queue[whole]
-        steepest = max(steepest, _force(w2, drag, h, a, hh, state) / ((k + fraction) * T))
+        steepest = max(steepest, _felt_force(w2, drag, h, a, hh, state) / ((k + fraction) * T))
         for piece in range(pieces):
-            _step(E, state, after)
+            _advance(E, state, after)
             steepest = max(
-                steepest, _force(w2, drag, h, a, hh, state) / ((k + fraction) * T + (piece + 1) * early)
+                steepest, _felt_force(w2, drag, h, a, hh, state) / ((k + fraction) * T + (piece + 1) * early)
             )
     return steepest
 
 
 @compiled_lean
-def _generator(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, lag: float, A: Floats) -> None:
-    """Fill A with d/dt of the state: x, x', the actuator's force and the commanded one, with the handle held."""
+def _fill_generator(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, lag: float, A: Floats) -> None:
+    """Fill A with d/dt of the state: x (m), x' (m), the actuator's force and the commanded one, the handle held.
+
+    hh  h.h;   lag  of the actuator [s]; 0: none
+    """
     m = len(w2)
     n = 2 * m + 2
     for i in range(n):
@@ -220,7 +236,10 @@ def _generator(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, lag: f
 
 @compiled_lean
 def _exponential(A: Floats, time: float, m: int, out: Floats, work: Floats) -> None:
-    """Fill out with exp(A time), by its series after halving and by squaring; velocities in metres per `time`."""
+    """Fill out (n, n) with exp(A time), by its series after halving and by squaring.
+
+    m  modes; their velocities, states m to 2 m - 1, are taken in metres per `time`;   work  (3, n, n)
+    """
     n = A.shape[0]
     M, term, other = work[0], work[1], work[2]
     norm = 0.0
@@ -269,7 +288,7 @@ def _multiply(A: Floats, B: Floats, out: Floats) -> None:
 
 
 @compiled_lean
-def _step(E: Floats, state: Floats, after: Floats) -> None:
+def _advance(E: Floats, state: Floats, after: Floats) -> None:
     """Move the state one piece on, by its transition E; `after` is working memory."""
     n = len(state)
     for i in range(n):
@@ -282,19 +301,19 @@ def _step(E: Floats, state: Floats, after: Floats) -> None:
 
 
 @compiled_lean
-def _force(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, state: Floats) -> float:
-    """Force that the hand feels beyond that of free motion [N], from a state of `_generator`."""
+def _felt_force(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, state: Floats) -> float:
+    """Force that the hand feels beyond that of free motion [N], from a state of `_fill_generator`."""
     m, force = len(w2), 0.0
     for i in range(m):
-        own = w2[i] * state[i] - a[i] * state[2 * m]
+        of_mode = w2[i] * state[i] - a[i] * state[2 * m]
         for j in range(m):
-            own += drag[i, j] * state[m + j]
-        force += h[i] * own
+            of_mode += drag[i, j] * state[m + j]
+        force += h[i] * of_mode
     return float(force / hh)
 
 
 @compiled_lean
-def _estimate(loops: LoopTable, c: int, y: float, past: Floats, memory: Floats) -> float:
+def _velocity_estimate(loops: LoopTable, c: int, y: float, past: Floats, memory: Floats) -> float:
     """Velocity estimate of computer c after another reading y; `past` and `memory` are moved on."""
     count = loops.window_count[c]
     for j in range(count - 1, 0, -1):
@@ -304,22 +323,26 @@ def _estimate(loops: LoopTable, c: int, y: float, past: Floats, memory: Floats) 
     for j in range(count):
         value += loops.window[c, j] * past[j]
     for k in range(loops.velocity_count[c]):
-        value = _through(loops.velocity[c, k], value, memory[k])
+        value = _filter_sample(loops.velocity[c, k], value, memory[k])
     return value
 
 
 @compiled_lean
-def _filtered(loops: LoopTable, c: int, lagging: int, force: float, memory: Floats) -> float:
+def _filtered_command(loops: LoopTable, c: int, lagging: int, force: float, memory: Floats) -> float:
     """A command [N] through the force filter; the actuator's lag, the last factor if `lagging`, is left out."""
     before, value = loops.velocity.shape[1], force
     for k in range(loops.force_count[c] - lagging):
-        value = _through(loops.force[c, k], value, memory[before + k])
+        value = _filter_sample(loops.force[c, k], value, memory[before + k])
     return value
 
 
 @compiled_lean
-def _through(factor: Floats, value: float, memory: Floats) -> float:
-    """A sample through (c2 d^2 + c1 d + c0)/(d2 d^2 + d1 d + d0), d = z - 1, in transposed direct form II."""
+def _filter_sample(factor: Floats, value: float, memory: Floats) -> float:
+    """A sample through (c2 d^2 + c1 d + c0)/(d2 d^2 + d1 d + d0), d = z - 1, in transposed direct form II.
+
+    factor  c2, c1, c0, d2, d1, d0;   memory  (2,)  is moved on
+    """
+    # as (b0 + b1/z + b2/z^2)/(1 + a1/z + a2/z^2)
     c2, c1, c0, d2, d1, d0 = factor[0], factor[1], factor[2], factor[3], factor[4], factor[5]
     if d2 != 0.0:
         b0, b1, b2 = c2 / d2, (c1 - 2.0 * c2) / d2, (c2 - c1 + c0) / d2

@@ -162,7 +162,10 @@ def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
 
 
 class _PathTracer:
-    """Values and matched eigenvalues so far."""
+    """Eigenvalues followed along values: `values` (k,), and `z` (k, N), each column one path.
+
+    steps  value and eigenvalues (N,) of each step so far
+    """
 
     def __init__(self, matrix_at: Callable[[float], ArrayLike], requested: Floats) -> None:
         """Trace the eigenvalues of `matrix_at` over the requested values (k,)."""
@@ -182,16 +185,19 @@ class _PathTracer:
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
     def trace_to(self, end: float, unordered: Complexes, halvings: int) -> None:
-        """Add the eigenvalues at `end`, given unordered, and steps between while the match is uncertain."""
+        """Add the eigenvalues (N,) at `end`, given unordered, and steps between while the match is uncertain.
+
+        halvings  how often the way to `end` may still be halved
+        """
         start, z = self.steps[-1]
         if len(z) != len(unordered):
             raise NoAnswerError(
                 f"there are {len(z)} eigenvalues at {start:g} and {len(unordered)} at {end:g}: a motion or a "
                 "delayed sample comes or goes between, and paths would begin or end; choose values on one side"
             )
-        matched, plain = _match(z, unordered)
+        matched, certain = _match(z, unordered)
         middle = 0.5 * (start + end)
-        if plain or halvings == 0 or middle in (start, end):
+        if certain or halvings == 0 or middle in (start, end):
             self.steps.append((end, matched))
             return
         self.trace_to(middle, self.eigenvalues_at(middle), halvings - 1)
@@ -237,5 +243,5 @@ def _match(z: Complexes, others: Complexes) -> tuple[Complexes, bool]:
     distance_moved, other_distances = distance[assignment], distance.copy()
     other_distances[assignment] = np.inf
     distinct = distance_moved <= 0.5 * other_distances.min(axis=1, initial=np.inf)
-    plain = (distance_moved <= SHORT) | (distinct & (distance_moved <= LONG * np.maximum(np.abs(z), 1.0)))
-    return others[assignment[1]], bool(np.all(plain))
+    certain = (distance_moved <= SHORT) | (distinct & (distance_moved <= LONG * np.maximum(np.abs(z), 1.0)))
+    return others[assignment[1]], bool(np.all(certain))

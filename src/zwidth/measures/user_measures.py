@@ -52,9 +52,9 @@ class FileFunction:
 
     def __call__(self, point: OperatingPoint, wall: WantedWall | None = None) -> Any:
         """Value at a point, for a wanted wall where there is one; what is printed goes to standard error."""
-        own = _measures(self.file, self.text)[self.name]
+        loaded = _measures(self.file, self.text)[self.name]
         with redirect_stdout(sys.stderr):
-            return (own if wall is None else own.at_wall(wall)).compute(point)
+            return (loaded if wall is None else loaded.at_wall(wall)).compute(point)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as path, compressed content and name, by which another process loads it again."""
@@ -153,12 +153,12 @@ def _unpickled(file: str, text: bytes, name: str) -> FileFunction:
 @lru_cache(maxsize=8)
 def _measures(file: str, text: str) -> dict[str, Measure]:
     """The measures of a file with this content, which is run once in each process."""
-    module = _run(Path(file), text)
+    module = _run_as_module(Path(file), text)
     return {one.name: one for one in vars(module).values() if isinstance(one, Measure) and callable(one.function)}
 
 
-def _run(file: Path, text: str) -> ModuleType:
-    """Run a user's file as a module. Raises ValueError that names the line at which it fails."""
+def _run_as_module(file: Path, text: str) -> ModuleType:
+    """Run a user's file with this content as a module. Raises ValueError that names the line at which it fails."""
     label = f"zwidth_measures_{sha256((str(file) + text).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(label, file)
     assert spec is not None
@@ -169,14 +169,14 @@ def _run(file: Path, text: str) -> ModuleType:
             exec(compile(text, str(file), "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
         del sys.modules[label]
-        line = error.lineno if isinstance(error, SyntaxError) else _line(error, file)
+        line = error.lineno if isinstance(error, SyntaxError) else _failing_line(error, file)
         place = f"{file.name}:{line}" if line else file.name
         reason = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
         raise ValueError(f"{place} does not run: {reason}") from None
     return module
 
 
-def _line(error: BaseException, file: Path) -> int:
+def _failing_line(error: BaseException, file: Path) -> int:
     """The last line of that file in an error's traceback; 0 for none."""
     line, frame = 0, error.__traceback__
     while frame is not None:

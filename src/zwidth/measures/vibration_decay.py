@@ -89,6 +89,7 @@ def optimal_mass(
     P, D = np.where(is_valid, K, 0.0) / k, np.where(is_valid, B, 1.0) / (k * T)
     R = 8.0 * D * (1.0 + P) / ((2.0 * D + P) ** 2 + 8.0 * D)
     g = R * (2.0 * D - P * R) / (2.0 * D * (R * (2.0 + P + D) + D))
+    # the third root, and the sum of the other two, by the polynomial's coefficients
     third, pair = g * D / R, 2.0 - g * (2.0 + P + D) - g * D / R
     # at g = 2 the motor's vibration is at half the sampling frequency, where the wall moves nothing that is read
     reached = is_valid & (2.0 * D > P) & (g < 2.0) & (pair**2 <= 4.0 * R) & (third**2 <= R)
@@ -126,7 +127,7 @@ def fastest_mass(
 
     scale = np.linspace(np.log(lowest), np.log(highest), max(int(TRIED * np.log10(highest / lowest)), 8))
     radii = np.array([radius(at) for at in scale])
-    best = (float(radii.min()), float(scale[np.argmin(radii)]))
+    best = (float(radii.min()), float(scale[np.argmin(radii)]))  # spectral radius, and logarithm of the mass
     padded = np.concatenate([[np.inf], radii, [np.inf]])
     lowest_of_three = (radii <= padded[:-2]) & (radii <= padded[2:])
     for i in np.flatnonzero(lowest_of_three & (radii <= best[0] + NEAR_BEST)).tolist():
@@ -176,7 +177,7 @@ def spectral_radius_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
 
     def alone(at: Index) -> float:
         """Spectral radius at the point of an index."""
-        return float(_verdicts(point, wanted, at).spectral_radius[0])
+        return float(_verdict_at(point, wanted, at).spectral_radius[0])
 
     return complete_pointwise(_radii(point, wanted), alone, point)
 
@@ -190,7 +191,7 @@ def decay_time_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Me
         """Decay time at the point of an index [s]. Raises NoValueError where vibration does not decay."""
         radius, verdict = radii[at], UNSTABLE
         if not radius > 1.0 + NEAR:
-            verdicts = _verdicts(point, wanted, at)
+            verdicts = _verdict_at(point, wanted, at)
             radius, verdict = verdicts.spectral_radius[0], int(verdicts.verdict[0])
         if verdict != STABLE:
             raise NoValueError(f"the wanted wall is {NAMES[verdict]} here, so that vibration does not decay")
@@ -200,13 +201,13 @@ def decay_time_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Me
 
 
 def _radii(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Floats:
-    """Spectral radius at each of many points; nan where a point is to be asked alone."""
+    """Spectral radius at the wanted wall at each of many points (...); nan where it must be computed by itself."""
     walls = walls_of(wanted, point.shape)
     # a single point has the digits that `Loop.check` has
     return radii_at_points(point, *walls) if point.shape else np.full((), np.nan)
 
 
-def _verdicts(point: OperatingPoint, wanted: WantedWall | WantedWalls, at: Index) -> Verdicts:
+def _verdict_at(point: OperatingPoint, wanted: WantedWall | WantedWalls, at: Index) -> Verdicts:
     """Verdict on the wanted wall at the point of an index, by eigenvalues."""
     K, B = walls_of(wanted, point.shape)
     return judge(point[at].loop, [K[at]], [B[at]])

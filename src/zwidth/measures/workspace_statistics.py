@@ -70,7 +70,7 @@ def overall(
     if not len(counted_values):
         return Overall(np.nan, np.nan, np.nan, np.nan, np.nan, share, reached_share, 0)
     least, largest = float(counted_values.min()), float(counted_values.max())
-    average, spread = _moments(counted_values, w[counts])
+    average, spread = _mean_and_deviation(counted_values, w[counts])
     worst, best = {"higher": (least, largest), "lower": (largest, least), None: (np.nan, np.nan)}[better]
     return Overall(
         average=average,
@@ -108,7 +108,7 @@ def global_conditioning_index(
     counted = kappa[counts]
     if len(counted) and counted.min() < 1.0 - ROUNDING:
         raise ValueError(f"a condition number is at least 1, got {float(counted.min()):.6g}; is it a reciprocal?")
-    return _moments(1.0 / counted, w[counts])[0] if len(counted) else float("nan")
+    return _mean_and_deviation(1.0 / counted, w[counts])[0] if len(counted) else float("nan")
 
 
 def global_isotropy_index(
@@ -169,8 +169,8 @@ def _weight_share(weights: Floats, total: float) -> float:
     return float(weights.sum()) / total if total else float("nan")
 
 
-def _moments(x: Floats, w: Floats) -> tuple[float, float]:
-    """Weighted mean, and standard deviation about it; nan where a value is infinite."""
+def _mean_and_deviation(x: Floats, w: Floats) -> tuple[float, float]:
+    """Mean of values x (k,) with weights w (k,), and standard deviation; nan where a value is infinite."""
     w = w / w.sum()
     with np.errstate(invalid="ignore"):
         mean = float((w * x).sum())

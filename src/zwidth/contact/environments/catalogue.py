@@ -80,16 +80,16 @@ def load_environment(source: str) -> Environment:
     file = Path(path)
     if not file.is_file():
         raise ValueError(f"{path} is not an ordinary file" if file.exists() else f"no such file: {path}")
-    module = _run(file)
+    module = _run_as_module(file)
     environment = getattr(module, name, None)
     if not isinstance(environment, Environment):
-        raise ValueError(_missing(file, name, module, environment))
-    _try(environment)
+        raise ValueError(_no_environment_message(file, name, module, environment))
+    _check_array_bounds(environment)
     environment.force  # noqa: B018  compiles, so that what numba says against it is said here
     return environment
 
 
-def _run(file: Path) -> ModuleType:
+def _run_as_module(file: Path) -> ModuleType:
     """Run a user's file as a module. Raises ValueError that names the line at which it fails."""
     label = f"zwidth_environment_{sha256(str(file.resolve()).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(label, file)
@@ -101,16 +101,17 @@ def _run(file: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[label]
+        # `@environment` says itself which line is at fault
         if isinstance(error, ValueError) and str(error).startswith(f"{file.name}:"):
             raise ValueError(str(error)) from None
-        line = error.lineno if isinstance(error, SyntaxError) else _line(error, file)
+        line = error.lineno if isinstance(error, SyntaxError) else _failing_line(error, file)
         place = f"{file.name}:{line}" if line else file.name
         reason = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
         raise ValueError(f"{place} does not run: {reason}") from None
     return module
 
 
-def _line(error: BaseException, file: Path) -> int:
+def _failing_line(error: BaseException, file: Path) -> int:
     """Last line of the file in an error's traceback; 0 for none."""
     line, frame = 0, error.__traceback__
     while frame is not None:
@@ -120,18 +121,21 @@ def _line(error: BaseException, file: Path) -> int:
     return line
 
 
-def _missing(file: Path, name: str, module: ModuleType, attribute: object) -> str:
+def _no_environment_message(file: Path, name: str, module: ModuleType, attribute: object) -> str:
     """Message: the file has nothing of this name, or what it has (`attribute`) is no environment."""
-    own = [key for key, value in vars(module).items() if isinstance(value, Environment)]
+    names = [key for key, value in vars(module).items() if isinstance(value, Environment)]
     if attribute is not None:
         return f"{name} in {file.name} is not an environment; put @environment(...) above it"
-    near = get_close_matches(name, own, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(own) or 'none'}"
+    near = get_close_matches(name, names, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(names) or 'none'}"
     return f"{file.name} has no environment {name}; {hint}"
 
 
-def _try(environment: Environment) -> None:
-    """Raise ValueError for a function that reads beyond its arrays: Python notices it, machine code does not."""
+def _check_array_bounds(environment: Environment) -> None:
+    """Raise ValueError for a function that reads beyond its arrays: Python notices it, machine code does not.
+
+    It is called as Python at a few motions, in and out of a wall.
+    """
     values = np.array([1.0 if np.isnan(p.default) else p.default for p in environment.parameters])
     memory = np.zeros(MEMORY)
     for position, velocity in ((1e-3, 0.1), (1e-3, -0.1), (-1e-3, 0.1), (0.0, 0.0)):
@@ -140,5 +144,5 @@ def _try(environment: Environment) -> None:
         except IndexError:
             limits = f"its {len(values)} parameters or the {MEMORY} numbers of its memory"
             raise ValueError(f"{environment.where}: {environment.name} reads beyond {limits}") from None
-        except Exception:  # what only Python minds, numba decides
+        except Exception:  # any other error may be Python's alone; whether it compiles is seen later
             return

@@ -34,7 +34,10 @@ PLAIN_FUNCTIONS: Final[dict[int, Any]] = {}
 
 
 def address_of(dispatcher: Any) -> int:
-    """Where the machine code of a function compiled by `compiled_for` begins, for `function_at`."""
+    """Where the machine code of a function compiled by `compiled_for` begins, for `function_at`.
+
+    Without compilation a number that stands for the function in PLAIN_FUNCTIONS.
+    """
     if config.DISABLE_JIT:
         PLAIN_FUNCTIONS[id(dispatcher)] = dispatcher
         return id(dispatcher)
@@ -107,7 +110,7 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """In words: "from 0 on", "from 1 to 3", "any number", "0 or 1"."""
+        """The allowed values in words: "from 0 on", "from 1 to 3", "any number", "0 or 1"."""
         if self.switch:
             return "0 or 1"
         last = ", or inf" if self.endless else ""
@@ -184,7 +187,7 @@ class Environment:
 
         Raises  ValueError  for an unknown name (with the nearest), a missing or not allowed value; all at once
         """
-        faults = [self._unknown(name) for name in given if name not in self.names]
+        faults = [self._unknown_message(name) for name in given if name not in self.names]
         numbers = []
         for parameter in self.parameters:
             value = given.get(parameter.name, parameter.default)
@@ -199,7 +202,7 @@ class Environment:
         """Names of the parameters."""
         return tuple(parameter.name for parameter in self.parameters)
 
-    def _unknown(self, name: str) -> str:
+    def _unknown_message(self, name: str) -> str:
         """Message: the environment has no parameter of this name; with the nearest."""
         near = get_close_matches(name, self.names, n=1)
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(self.names) or 'none'}"
@@ -252,7 +255,7 @@ def environment(
 
     def decorate(function: ForceLaw) -> Environment:
         """Make the environment of a function, once both it and the parameters are checked."""
-        _check(function)
+        _check_function(function)
         description = (inspect.getdoc(function) or "").split("\n")[0]
         title = name or function.__name__.replace("_", " ")
         made = Environment(title, function, tuple(parameters), description, _source(function), linear, surface)
@@ -270,7 +273,7 @@ def _source(function: ForceLaw) -> str:
     return f"{file.resolve()}:{function.__name__}" if file.is_file() else ""
 
 
-def _check(function: ForceLaw) -> None:
+def _check_function(function: ForceLaw) -> None:
     """Raise ValueError for a function that does not take the six arguments, or that raises errors itself."""
     code = function.__code__
     where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: {function.__name__}"
@@ -297,8 +300,8 @@ def _check_parameters(made: Environment) -> None:
 def shortened(message: str) -> str:
     """Numba's report as one sentence: its first reason, and the line of the source that it points at."""
     lines = [line.strip() for line in message.splitlines()]
-    noise = ("Failed in ", "No implementation of function", "There are ", "Overload ", "During", "This error")
-    reasons = [line for line in lines if line and not line.startswith(noise) and line[0] not in ">-^[<"]
+    unhelpful = ("Failed in ", "No implementation of function", "There are ", "Overload ", "During", "This error")
+    reasons = [line for line in lines if line and not line.startswith(unhelpful) and line[0] not in ">-^[<"]
     pointed = next((line for line in lines if line.startswith("File ")), "")
     reason = next((line for line in reasons if not line.startswith("File ")), "no reason was given")
     place = pointed.replace('"', "").rstrip(":").split(", ")[-1] if pointed else ""

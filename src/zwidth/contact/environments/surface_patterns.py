@@ -4,6 +4,10 @@ texture          a wavy surface, felt by the force along it
 grating          ridges and grooves with straight flanks, felt by the force along them
 friction_patch   a patch that one rubs over: sticking by a spring whose anchor slips
 virtual_mass     a mass that is felt everywhere, by a filtered estimate of the acceleration
+
+Arguments of each: position [m], positive inside or along the surface, estimated velocity [m/s], time and period
+[s], parameters in the order in which they are declared, memory (8,). It returns the force on the device [N]; see
+`Environment`.
 """
 
 from __future__ import annotations
@@ -37,11 +41,13 @@ def texture(
     >>> round(texture.function(0.5e-3, 0.0, 0.0, 1e-3, texture.values(), None), 6)
     -0.314159
     """
-    if not 0.0 < position <= parameters[4]:
+    height, wavelength, normal_force = parameters[0], parameters[1], parameters[2]
+    damping, length = parameters[3], parameters[4]
+    if not 0.0 < position <= length:
         return 0.0
-    around = 2.0 * np.pi / parameters[1]
-    slope = 0.5 * parameters[0] * around * np.sin(around * position)
-    return float(-parameters[2] * slope - parameters[3] * velocity)
+    around = 2.0 * np.pi / wavelength
+    slope = 0.5 * height * around * np.sin(around * position)
+    return float(-normal_force * slope - damping * velocity)
 
 
 @environment(
@@ -68,15 +74,18 @@ def grating(
     >>> [grating.function(x, 0.0, 0.0, 1e-3, values, None) for x in (1e-4, 5e-4, 1.1e-3)]
     [-1.0, 0.0, 1.0]
     """
-    if not 0.0 < position <= parameters[4]:
+    height, pitch, flank = parameters[0], parameters[1], parameters[2]
+    normal_force, length = parameters[3], parameters[4]
+    if not 0.0 < position <= length:
         return 0.0
-    place = position / parameters[1] % 1.0
-    force = float(parameters[3] * parameters[0] / (parameters[2] * parameters[1]))
-    if place < parameters[2]:
+    place = position / pitch % 1.0
+    force = float(normal_force * height / (flank * pitch))
+    if place < flank:
         return -force
-    return force if 0.5 <= place < 0.5 + parameters[2] else 0.0
+    return force if 0.5 <= place < 0.5 + flank else 0.0
 
 
+# Places in the memory: 1 while on the patch, last position, stretch x - w of the spring, 1 while sliding.
 INSIDE, LAST, STRETCH, SLIDING = range(4)
 
 
@@ -124,6 +133,7 @@ def friction_patch(
     return float(-stiffness * stretch)
 
 
+# Places in the memory: 1 after the first sample, last velocity, filtered acceleration.
 BEGUN, SPEED, ACCELERATION = range(3)
 
 
@@ -158,7 +168,8 @@ def virtual_mass(
     if memory[BEGUN] == 0.0:
         memory[BEGUN], memory[SPEED] = 1.0, velocity
         return 0.0
-    share = 1.0 - np.exp(-2.0 * np.pi * parameters[1] * period)
+    mass, cutoff = parameters[0], parameters[1]
+    share = 1.0 - np.exp(-2.0 * np.pi * cutoff * period)
     memory[ACCELERATION] += share * ((velocity - memory[SPEED]) / period - memory[ACCELERATION])
     memory[SPEED] = velocity
-    return float(-parameters[0] * memory[ACCELERATION])
+    return float(-mass * memory[ACCELERATION])

@@ -7,6 +7,10 @@ nonlinear_wall   its spring hardens or softens with depth
 hunt_crossley    its damping grows with depth: no jump of the force at the surface, no pull at slow speeds
 slot             two walls that face each other, with room between
 coupled_wall     met by a proxy, which pulls the device along by a spring and a damper: the virtual coupling
+
+Arguments of each: position [m], positive inside or along the surface, estimated velocity [m/s], time and period
+[s], parameters in the order in which they are declared, memory (8,). It returns the force on the device [N]; see
+`Environment`.
 """
 
 from __future__ import annotations
@@ -44,8 +48,9 @@ def one_sided_wall(
     """
     if not position > 0.0:
         return 0.0
-    force = float(-(parameters[0] * position + parameters[1] * velocity))
-    return min(force, 0.0) if parameters[2] > 0.0 else force
+    K, B, no_pull = parameters[0], parameters[1], parameters[2]
+    force = float(-(K * position + B * velocity))
+    return min(force, 0.0) if no_pull > 0.0 else force
 
 
 @environment(
@@ -66,7 +71,8 @@ def wall(
     >>> wall.function(0.001, 0.1, 0.0, 1e-3, values, memory)
     -2.1
     """
-    return float(-(parameters[0] * position + parameters[1] * velocity))
+    K, B = parameters[0], parameters[1]
+    return float(-(K * position + B * velocity))
 
 
 @environment(
@@ -93,11 +99,11 @@ def pressed_wall(
     >>> [pressed_wall.function(x, 0.0, 0.0, 1e-3, values, None) for x in (0.001, -0.004, -0.02)]
     [-1.0, 4.0, 5.0]
     """
-    K, B, F = parameters[0], parameters[1], parameters[2]
+    K, B, F, no_pull = parameters[0], parameters[1], parameters[2], parameters[3]
     if not (F + K * position) * F > 0.0:
         return float(F)
     pressed = F + K * position + B * velocity
-    if parameters[3] > 0.0 and pressed * F < 0.0:
+    if no_pull > 0.0 and pressed * F < 0.0:
         pressed = 0.0
     return float(F - pressed)
 
@@ -125,10 +131,11 @@ def nonlinear_wall(
     >>> nonlinear_wall.function(1e-3, 0.0, 0.0, 1e-3, nonlinear_wall.values(), None)
     -1.1
     """
-    if not position > 0.0 and parameters[3] == 0.0:
+    stiffness, cubic, damping, two_sided = parameters[0], parameters[1], parameters[2], parameters[3]
+    if not position > 0.0 and two_sided == 0.0:
         return 0.0
-    spring = (parameters[0] + parameters[1] * position * position) * position
-    return float(-(spring + parameters[2] * velocity))
+    spring = (stiffness + cubic * position * position) * position
+    return float(-(spring + damping * velocity))
 
 
 @environment(
@@ -158,8 +165,9 @@ def hunt_crossley(
     """
     if not position > 0.0:
         return 0.0
-    force = float(-parameters[0] * position ** parameters[1] * (1.0 + parameters[2] * velocity))
-    return min(force, 0.0) if parameters[3] > 0.0 else force
+    stiffness, exponent, dissipation, no_pull = parameters[0], parameters[1], parameters[2], parameters[3]
+    force = float(-stiffness * position**exponent * (1.0 + dissipation * velocity))
+    return min(force, 0.0) if no_pull > 0.0 else force
 
 
 @environment(
@@ -183,19 +191,20 @@ def slot(
     >>> [slot.function(x, 0.0, 0.0, 1e-3, slot.values(), None) for x in (1e-3, -2e-3, -6e-3)]
     [-1.0, 0.0, 1.0]
     """
-    width = parameters[0]
+    width, stiffness, damping, no_pull = parameters[0], parameters[1], parameters[2], parameters[3]
     if position > 0.0:
         depth = position
     elif position < -width:
         depth = position + width
     else:
         return 0.0
-    force = float(-(parameters[1] * depth + parameters[2] * velocity))
-    if parameters[3] > 0.0 and force * depth > 0.0:
+    force = float(-(stiffness * depth + damping * velocity))
+    if no_pull > 0.0 and force * depth > 0.0:  # a wall's force is against the depth
         return 0.0
     return force
 
 
+# Places in the memory: 1 after the first sample, place w and speed u of the proxy.
 BEGUN, PLACE, SPEED = range(3)
 
 

@@ -149,14 +149,14 @@ class MechanismMotion(Result):
         if not len(self.time):
             return dict.fromkeys(("hand", "motors", "gravity", "friction", "dampers", "stored"), np.nan)
         stored = self.kinetic + self.elastic
-        put = {
+        supplied = {
             "hand": float(self.hand_work[-1]),
             "motors": float(self.motor_work[-1]),
             "gravity": float(self.gravitational[0] - self.gravitational[-1]),
             "friction": -float(self.friction_loss[-1]),
         }
-        more = float(stored[-1] - stored[0])
-        return put | {"dampers": more - sum(put.values()), "stored": more}
+        increase = float(stored[-1] - stored[0])
+        return supplied | {"dampers": increase - sum(supplied.values()), "stored": increase}
 
     # --- as data --------------------------------------------------------------------------------------
 
@@ -193,7 +193,7 @@ class MechanismMotion(Result):
             "counted_position_m": self.counted_position,
             "depth_m": self.depth,
             "force_N": self.force,
-            **self._of_drives(),
+            **self._drive_series(),
             **self._energies(),
         }
 
@@ -201,12 +201,12 @@ class MechanismMotion(Result):
         """The motion in time as columns, one for each component."""
 
         def parts(values: Floats, name: str) -> dict[str, Floats]:
-            """Columns of a vector's components (k, 3), each named by its axis."""
+            """Columns of a vector's components (k, 3), each named by its axis in place of {} in `name`."""
             return {name.format(axis): values[:, k] for k, axis in enumerate(AXES)}
 
         drives = {
             f"{quantity}_{name}_{unit}": values
-            for key, by_name in self._of_drives().items()
+            for key, by_name in self._drive_series().items()
             for quantity, _, unit in [key.partition("_")]
             for name, values in by_name.items()
         }
@@ -220,8 +220,8 @@ class MechanismMotion(Result):
             **self._energies(),
         }
 
-    def _of_drives(self) -> dict[str, dict[str, Floats]]:
-        """Torques and motor angles by drive, joint angles by the link that the drive turns."""
+    def _drive_series(self) -> dict[str, dict[str, Floats]]:
+        """Torques and motor angles (k,) by drive, joint angles by the link that the drive turns; by key."""
         drives, links = self.mechanism.drives, self.mechanism.links
         joints = [links.names[joint] for joint in drives.joint]
         return {
@@ -267,6 +267,6 @@ def _share(flags: Flags) -> float:
 
 
 def _largest(values: Floats) -> float:
-    """The largest of what is known; nan where nothing is, as of a force that the environment did not give."""
+    """The largest of the values that are not nan, as a force that the environment did not give is; nan without."""
     known = values[~np.isnan(values)]
     return float(known.max()) if len(known) else np.nan

@@ -1,4 +1,4 @@
-"""The loop over the samples of one motion, compiled."""
+"""The loop over the samples of one motion, compiled; x is the state (N,) as `system` has it, j a sample."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from zwidth.contact.mechanism.rendering import (
     render,
     rendering_memory_of,
 )
-from zwidth.contact.mechanism.stepping import configure, linearise_drives, prepare, step_mechanism, turned_vector
+from zwidth.contact.mechanism.stepping import configure, linearise_drives, prepare, step_mechanism, turned_far
 from zwidth.contact.mechanism.surfaces import penetration
 from zwidth.contact.mechanism.system import Memory, System, motion_memory
 from zwidth.model.closure import equations, orientation, passive_rates
@@ -33,6 +33,11 @@ AT_LIMIT: Final = 100  # and the number of the link whose joint is at its limit
 NEAR_SINGULAR: Final = (
     1e-3  # reciprocal condition of the loops below which the drives hardly hold the other joints
 )
+
+
+# Columns of `Trace.energy`, and of `Trace.work`.
+KINETIC, ELASTIC, GRAVITATIONAL = range(3)
+BY_HAND, BY_MOTORS, AGAINST_FRICTION = range(3)
 
 
 class Trace(NamedTuple):
@@ -65,13 +70,15 @@ def run_motion(
     substeps: int,
     trace: Trace,
 ) -> tuple[int, int]:
-    """Fill the trace sample by sample; the status, and how many samples were reached.
+    """Fill the trace sample by sample; the status, DONE to AT_LIMIT, and how many samples were reached.
 
-    computers  the one that renders the law;   fraction  of its delay that is no whole sample
-    start (N,) first state, angles (links,) near its posture;   push (1 or samples, 3) at the handle
+    law        what is rendered;   computers  the one that renders it
+    fraction   of its delay that is no whole sample
+    start      (N,)  first state;   angles  (links,)  of the joints, near its posture [rad]
+    push       (1 or samples, 3)  force at the handle [N];   substeps  between samples
     """
     computer, memory = computer_at(computers, 0), motion_memory(system)
-    own, period = rendering_memory_of(system.mech, computer), computer.period
+    rendering, period = rendering_memory_of(system.mech, computer), computer.period
     d, samples = system.mech.driven, trace.depth.size - 1
     x, trial, hand = start.copy(), np.zeros(start.size), np.zeros(3)
     friction, resting, work = np.zeros(d), np.zeros(d), np.zeros(3)
@@ -82,25 +89,25 @@ def run_motion(
         counts[0] = max(1, int(np.ceil(fraction * substeps)))
         counts[1] = max(1, int(np.ceil((1.0 - fraction) * substeps)))
     for i in range(angles.size):
-        memory.angles[i], own.angles[i] = angles[i], angles[i]
-    ready(system.mech, memory.angles, memory.work)
-    ready(system.mech, own.angles, own.work)
+        memory.angles[i], rendering.angles[i] = angles[i], angles[i]
+    set_passive_rates(system.mech, memory.angles, memory.work)
+    set_passive_rates(system.mech, rendering.angles, rendering.work)
     for j in range(samples + 1):
         status = check_state(system, memory, x, configure(system, memory, x))
         if status != DONE:
             return status, j
         record_state(system, memory, law, x, hand, work, trace, j)
         # the computer has a posture of its own, that of the counted angles: it renders where it sees the handle
-        if not locate_handle(system, law, own, x, j):
+        if not locate_handle(system, law, rendering, x, j):
             return LOOP_LOST, j
-        answered = render(law, computer, own, j)
-        record_computer(own, trace, j)
+        answered = render(law, computer, rendering, j)
+        record_computer(rendering, trace, j)
         if not answered:
             return NO_FORCE, j + 1
         if j == samples:
             break
         # the linear part of a step is made anew only where the mechanism has turned far enough to change it
-        if j == 0 or turned_vector(memory, x):
+        if j == 0 or turned_far(memory, x):
             linearise_drives(system, memory, x)
             for part in range(2):
                 if counts[part] > 0:
@@ -113,8 +120,9 @@ def run_motion(
         for part in range(2):
             if counts[part] == 0:
                 continue
-            apply_command(system, memory, computer, own, part)
-            work[1] -= torque_angle_product(system, memory, x)
+            apply_command(system, memory, computer, rendering, part)
+            # torques are held over the part: their work is torque times the change of angle
+            work[BY_MOTORS] -= torque_angle_product(system, memory, x)
             for _ in range(counts[part]):
                 if not configured and configure(system, memory, x) < 0.0:
                     return LOOP_LOST, j + 1
@@ -123,15 +131,19 @@ def run_motion(
                 )
                 if not np.isfinite(lost):
                     return LOOP_LOST, j + 1
-                work[2] += lost
+                work[AGAINST_FRICTION] += lost
                 configured = False
-            work[1] += torque_angle_product(system, memory, x)
+            work[BY_MOTORS] += torque_angle_product(system, memory, x)
     return DONE, samples + 1
 
 
 @compiled_lean
-def ready(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
-    """The passive joints' rates at the first posture, from which Newton starts, and its side of singularities."""
+def set_passive_rates(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
+    """Set in `work`, at the first posture, the passive joints' rates, from which Newton's method starts, and the
+    rows of the closures by which `check_state` sees that a singularity was passed.
+
+    angles  (links,)  of the joints [rad]
+    """
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
     passive_rates(mech, 0, work)
@@ -140,7 +152,11 @@ def ready(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
 
 @compiled_lean
 def check_state(system: System, memory: Memory, x: Floats, condition: float) -> int:
-    """Status: whether the motion can go on from this state; its loops are compared with those a sample before."""
+    """Status of a state: DONE where the motion can go on from it, else why it cannot.
+
+    The loops' orientation is compared with that a sample before, since a step may pass a singularity.
+    condition  reciprocal condition of the loops, negative where they do not close, as `configure` returns it
+    """
     work, mech = memory.work, system.mech
     for i in range(x.size):
         if not np.isfinite(x[i]):
@@ -171,7 +187,11 @@ def record_state(
     trace: Trace,
     j: int,
 ) -> None:
-    """Note a configured state, its energy and what the hand has done since the sample before."""
+    """Record sample j: a configured state x (N,), its energy, and the work done until then.
+
+    hand  (3,)  force at the handle since the sample before [N]
+    work  (3,)  BY_HAND to AGAINST_FRICTION, to which what the hand has done since then is added [J]
+    """
     mech, links, M = system.mech, memory.work, memory.mass
     motor, rotor, spring = system.motor, system.rotor, system.spring
     state, position, energy, done = trace.state, trace.position, trace.energy, trace.work
@@ -182,9 +202,9 @@ def record_state(
     for k in range(3):
         position[j, k] = h[k]
         if j > 0:
-            work[0] += hand[k] * (h[k] - position[j - 1, k])
+            work[BY_HAND] += hand[k] * (h[k] - position[j - 1, k])
     trace.depth[j] = penetration(law.surface, h[0], h[1], h[2])[0]
-    kinetic, elastic, height = 0.0, 0.0, 0.0
+    kinetic, elastic, gravitational = 0.0, 0.0, 0.0
     for i in range(d):
         kinetic += 0.5 * rotor[i] * x[n + motor[i]] ** 2
         for k in range(d):
@@ -197,8 +217,8 @@ def record_state(
     for i in range(mech.parent.size):
         c = link_point(links.rotation, links.origin, i, mech.center_of_mass, 0, i)
         for k in range(3):
-            height -= mech.mass[0, i] * system.gravity[k] * c[k]
-    energy[j, 0], energy[j, 1], energy[j, 2] = kinetic, elastic, height
+            gravitational -= mech.mass[0, i] * system.gravity[k] * c[k]
+    energy[j, KINETIC], energy[j, ELASTIC], energy[j, GRAVITATIONAL] = kinetic, elastic, gravitational
     for k in range(3):
         done[j, k] = work[k]
 
@@ -221,18 +241,21 @@ def record_computer(rendering: RenderingMemory, trace: Trace, j: int) -> None:
 def apply_command(
     system: System, memory: Memory, computer: Computer, rendering: RenderingMemory, part: int
 ) -> None:
-    """Let the motors take the command of this part of the interval: at once, or through their lag."""
+    """Let the motors take the command of this part of the interval (0: the older, 1: the newer one).
+
+    Into `memory.hold` at once, or, where they lag, into `memory.command`, which their torques follow.
+    """
     held, follow, motor, lagging = memory.hold, memory.command, system.motor, system.lag_command
     for i in range(held.size):
         held[i] = 0.0
-    straight = True
+    without_lag = True
     for k in range(lagging.size):
         follow[k] = 0.0
         if lagging[k] >= 0:
             follow[k] = arrived_command(computer, rendering.signals, lagging[k], part)
-            straight = False
+            without_lag = False
     # a motor behind a lag follows its command by a state of its own
-    if straight:
+    if without_lag:
         for i in range(motor.size):
             held[motor[i]] = arrived_command(computer, rendering.signals, i, part)
 

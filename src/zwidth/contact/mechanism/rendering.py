@@ -2,7 +2,7 @@
 
 Counting, estimating, filtering and delaying one signal are `contact.computer`'s.
 
-Environment, surface and drives of a rendering as numbers for the kernels.
+Environment, surface and drives of a rendering as numbers for the kernels: `law` in all of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.environments import MEMORY, environment_at
-from zwidth.contact.mechanism.surfaces import NONE, penetration
+from zwidth.contact.mechanism.surfaces import KIND, NONE, penetration
 from zwidth.contact.mechanism.system import System
 from zwidth.model.continuation import close_at
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, working_memory
@@ -58,16 +58,16 @@ class RenderingMemory(NamedTuple):
 def rendering_memory_of(mech: MechanismArrays, computer: Computer) -> RenderingMemory:
     """The memory of a mechanism's computer that has just been switched on."""
     return RenderingMemory(
-        signals_of(computer, 3, mech.driven),
-        working_memory(mech),
-        np.zeros(mech.parent.size),
-        np.zeros(mech.driven),
-        np.zeros((1, 3, mech.driven)),
-        np.zeros((1, 3, mech.driven)),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(MEMORY),
+        signals=signals_of(computer, 3, mech.driven),
+        work=working_memory(mech),
+        angles=np.zeros(mech.parent.size),
+        counted_angles=np.zeros(mech.driven),
+        jacobian=np.zeros((1, 3, mech.driven)),
+        angular_jacobian=np.zeros((1, 3, mech.driven)),
+        counted_position=np.zeros(3),
+        speed=np.zeros(3),
+        force=np.zeros(3),
+        environment=np.zeros(MEMORY),
     )
 
 
@@ -75,15 +75,18 @@ def rendering_memory_of(mech: MechanismArrays, computer: Computer) -> RenderingM
 def locate_handle(
     system: System, law: RenderingInputs, rendering: RenderingMemory, x: Floats, sample: int
 ) -> bool:
-    """Count the motors and place the handle where the counts say; False where their loops do not close."""
-    mech, counted, seen, read = (
+    """Read the encoders and place the handle by their counts; False where the loops do not close at these.
+
+    x  (N,)  state of the mechanism;   sample  its number, by which noise is drawn
+    """
+    mech, counted, seen, coordinates = (
         system.mech,
         rendering.counted_angles,
         rendering.counted_position,
         law.encoder_coordinates,
     )
     for i in range(counted.size):
-        counted[i] = read_encoder(x[read[i]], law.step[i], law.noise[i], law.seed, sample, i)
+        counted[i] = read_encoder(x[coordinates[i]], law.step[i], law.noise[i], law.seed, sample, i)
     if close_at(mech, counted, rendering.angles, rendering.work) < 0.0:
         return False
     seen[0], seen[1], seen[2] = link_point(
@@ -107,7 +110,7 @@ def render(law: RenderingInputs, computer: Computer, rendering: RenderingMemory,
         speed[k] = estimate_velocity(computer, rendering.signals, k, seen[k], sample)
     depth, nx, ny, nz = penetration(law.surface, seen[0], seen[1], seen[2])
     push, answered = 0.0, True
-    if law.surface[0] != NONE:
+    if law.surface[KIND] != NONE:
         rate, period = -(nx * speed[0] + ny * speed[1] + nz * speed[2]), computer.period
         environment = environment_at(law.address)
         # from 0, so that no force is 0 and not -0
@@ -119,12 +122,12 @@ def render(law: RenderingInputs, computer: Computer, rendering: RenderingMemory,
     scale = share_within(np.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2), computer.limit)
     for k in range(3):
         force[k] *= scale
-    command(law, rendering)
+    send_torques(law, rendering)
     return bool(answered)
 
 
 @compiled_lean
-def command(law: RenderingInputs, rendering: RenderingMemory) -> None:
+def send_torques(law: RenderingInputs, rendering: RenderingMemory) -> None:
     """Send the motors the torques J^T f, each cut at its limit or all scaled alike."""
     force, J, limit, scale = rendering.force, rendering.jacobian, law.limit, 1.0
     if law.together:
@@ -183,8 +186,10 @@ def rendering_inputs(
 ) -> RenderingInputs:
     """What the computer renders, reads and commands, as numbers for the kernels; see `RenderingInputs`.
 
-    counted  False: encoders without steps and noise
+    surface, address, values, together  as in `RenderingInputs`;   read  (d,)  coordinates that the encoders read
+    counted  True: encoders with their counts and noise; False: without
     """
+    # n: motor turns per joint turn, by which the motors' numbers become the joints'
     n, counts, parts = drives.transmission, drives.encoder_counts, drives.nonlinearity
     known = np.isfinite(counts) & counted
     return RenderingInputs(

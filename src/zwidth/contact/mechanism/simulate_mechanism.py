@@ -211,7 +211,7 @@ def _simulate(
         **_course(system, trace, reached, period),
     )
     if status == kernel.NO_FORCE and environment is not None and surface is not None:
-        return replace(motion, reason=_unanswered(motion, environment, surface))
+        return replace(motion, reason=_no_force_message(motion, environment, surface))
     return motion
 
 
@@ -234,7 +234,7 @@ def _run(
     along = np.linalg.svd(posture.jacobian)[0][:, 0]
     plant = reduce_mechanism(mechanism, posture, along, "full", point.damping, point.encoders)
     system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
-    state = _start(mechanism, posture, system, start.rates)
+    state = _start_state(mechanism, posture, system, start.rates)
     trace = _empty_trace(inputs.samples + 1, len(state), len(system.motor))
     read = system.motor if point.encoders == "motor" else np.arange(len(system.motor))
     address = 0 if settings.environment is None else settings.environment.address
@@ -250,7 +250,7 @@ def _run(
     return system, trace, status, reached
 
 
-def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
+def _start_state(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
     """The first state (N,), from the drives' rates (d,) [rad/s]: joints and motors together, no drive bent."""
     d, n = len(system.motor), len(system.damping)
     start = np.zeros(2 * n + len(system.lag_time))
@@ -281,7 +281,7 @@ def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
 
 
 def _course(system: System, trace: kernel.Trace, reached: int, period: float) -> dict[str, Floats]:
-    """The records of each sample, by their names in `MechanismMotion`."""
+    """The records of the samples that were reached, by their names in `MechanismMotion`; period  T [s]."""
     d, n, motor, to_joint = len(system.motor), len(system.damping), system.motor, system.mech.to_joint[0]
     state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
     lagging = np.any(system.lag_command >= 0)
@@ -297,17 +297,17 @@ def _course(system: System, trace: kernel.Trace, reached: int, period: float) ->
         "motor_rates": state[:, n + motor].copy(),
         "force": trace.force[:reached],
         "torque": trace.torque[:reached],
-        "kinetic": energy[:, 0],
-        "elastic": energy[:, 1],
-        "gravitational": energy[:, 2],
-        "hand_work": work[:, 0],
-        "motor_work": np.full(reached, np.nan) if lagging else work[:, 1],
-        "friction_loss": work[:, 2],
+        "kinetic": energy[:, kernel.KINETIC],
+        "elastic": energy[:, kernel.ELASTIC],
+        "gravitational": energy[:, kernel.GRAVITATIONAL],
+        "hand_work": work[:, kernel.BY_HAND],
+        "motor_work": np.full(reached, np.nan) if lagging else work[:, kernel.BY_MOTORS],
+        "friction_loss": work[:, kernel.AGAINST_FRICTION],
     }
 
 
 def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
-    """Why a motion ends before its time; "" where it does not."""
+    """Why a motion with this status ends before its time, after so many seconds; "" where it does not."""
     if status >= kernel.AT_LIMIT:
         joint = mechanism.links.names[status - kernel.AT_LIMIT].partition("/")[0]
         return f"after {seconds:.6g} s joint {joint!r} is at its limit, beyond which nothing is known of the stop"
@@ -317,7 +317,7 @@ def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
     return reason and f"after {seconds:.6g} s {reason}"
 
 
-def _unanswered(motion: MechanismMotion, environment: Environment, surface: Surface) -> str:
+def _no_force_message(motion: MechanismMotion, environment: Environment, surface: Surface) -> str:
     """Message about the last sample, at which the environment gave no finite force."""
     depth, normal = depth_and_normal(surface, motion.counted_position[-1])
     rate = -float(normal @ motion.velocity[-1])
@@ -338,15 +338,16 @@ def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, s
     ones nearest to it are taken to the point of the surface that they are nearest to.
     """
     road = roadmap(mech, 0, np.ascontiguousarray(posture.angles))
-    here = np.concatenate([posture.position[None], road.position])
-    depth, normal = depth_and_normal(surface, here)
+    known = np.concatenate([posture.position[None], road.position])
+    depth, normal = depth_and_normal(surface, known)
     if np.max(depth) >= 0.0:
         return
     best = np.argsort(-depth)[:TRIED]
-    nearest, least = here[best[0]], -depth[best[0]]
-    at, depth, normal = here[best], depth[best], normal[best]
-    plane = handle_motions(posture)
+    nearest, least = known[best[0]], -depth[best[0]]
+    at, depth, normal = known[best], depth[best], normal[best]
+    plane = handle_motions(posture)  # orthonormal columns
     for _ in range(REACHES):
+        # ways: the normals' parts that the handle can move along; gain: by how much one of them lessens the depth
         ways = normal @ plane @ plane.T
         gain = np.sum(ways * normal, axis=1)
         reachable = gain > 1e-9  # elsewhere the handle cannot move towards the surface at all
@@ -445,7 +446,10 @@ ALONG: Final = 1e-9  # share of a velocity that may be beside what the handle ca
 
 @dataclass(frozen=True)
 class MotionInputs:
-    """samples: periods that the motion lasts;   push (1 or samples, 3) [N];   gravity (3,) [m/s²]"""
+    """Checked arguments of a motion.
+
+    samples  periods that it lasts;   push (1 or samples, 3) [N];   gravity (3,) [m/s²]
+    """
 
     samples: int
     push: Floats
@@ -461,7 +465,10 @@ def motion_inputs(
     substeps: int,
     drives: int,
 ) -> MotionInputs:
-    """Number of samples, push and gravity of a motion. Raises ArgumentError for what cannot be simulated."""
+    """Number of samples, push and gravity of a motion. Raises ArgumentError for what cannot be simulated.
+
+    duration  [s];   push, gravity  as in `simulate_mechanism`;   drives  their number
+    """
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))
     check_memory(
         samples * (23.0 + 12.0 * drives),
@@ -470,7 +477,7 @@ def motion_inputs(
     )
     _check_drives(mechanism)
     _check_friction(mechanism)
-    return MotionInputs(samples, _push(push, samples), _gravity(gravity))
+    return MotionInputs(samples, _push_array(push, samples), _gravity_vector(gravity))
 
 
 def start_rates(posture: Posture, velocity: ArrayLike | None) -> tuple[Floats, Floats]:
@@ -533,7 +540,7 @@ def _check_friction(mechanism: Mechanism) -> None:
         )
 
 
-def _push(push: ArrayLike | None, samples: int) -> Floats:
+def _push_array(push: ArrayLike | None, samples: int) -> Floats:
     """Force at the handle, (1, 3) for all samples or (samples, 3) [N]; 0 for None. Raises ArgumentError."""
     if push is None:
         return np.zeros((1, 3))
@@ -551,7 +558,7 @@ def _push(push: ArrayLike | None, samples: int) -> Floats:
     return given
 
 
-def _gravity(gravity: ArrayLike | None) -> Floats:
+def _gravity_vector(gravity: ArrayLike | None) -> Floats:
     """Gravity (3,) [m/s²]; 0 for None. Raises ArgumentError."""
     return np.zeros(3) if gravity is None else _vector("gravity", gravity, "m/s²")
 

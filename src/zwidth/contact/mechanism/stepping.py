@@ -13,6 +13,10 @@ that does not move far is stepped as exactly as a linear plant. The order is fou
 when the joints have turned.
 
 Accelerations of the mechanism at a state, its loops closed exactly, compiled.
+
+In all kernels x is the state (N,) as `system` has it, `part` 0 until the new command acts in a sampling interval
+and 1 after it, h the length of a substep [s], `trial` (N,) room for a state. A state is configured once
+`configure` has placed the links at it.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.mechanism.system import BRISTLES, DRY, Memory, System
-from zwidth.contact.plant_step import bristle_force, coulomb_force
+from zwidth.contact.plant_step import COULOMB_LEVEL, bristle_force, coulomb_force
 from zwidth.contact.vibration_kernel import exponential
 from zwidth.model.bias import bias
 from zwidth.model.continuation import NOT_CLOSED, close_at
@@ -36,8 +40,8 @@ SWEEPS: Final = 20  # of the drives' frictions against each other
 
 
 @compiled_lean
-def turned_vector(memory: Memory, x: Floats) -> bool:
-    """Whether the joints have turned so far since A was taken that it is worth taking anew."""
+def turned_far(memory: Memory, x: Floats) -> bool:
+    """Whether a joint has turned by more than LINEARISE_TURN since A was taken, so that A is taken anew."""
     base = memory.base
     most = 0.0
     for i in range(base.size):
@@ -86,6 +90,7 @@ def linearise_drives(system: System, memory: Memory, x: Floats) -> None:
 def balanced_norm(A: Floats, n: int) -> float:
     """A norm of A [1/s] in units that balance it, so that it is as large as the frequencies, not their squares."""
     N = A.shape[0]
+    # largest row sums: of stiffness over mass [1/s^2], and of rates [1/s]
     stiff, fast = 0.0, 0.0
     for i in range(n, N):
         to_places, to_rates = 0.0, 0.0
@@ -104,10 +109,14 @@ def balanced_norm(A: Floats, n: int) -> float:
 
 @compiled
 def prepare(system: System, memory: Memory, h: float, part: int) -> None:
-    """All that a substep of length h of one part of the sample needs, about the base just taken."""
+    """Fill `memory.half`, `gain` and `mobility` for substeps of length h [s] in one part of the sample.
+
+    A is that of `linearise_drives`, the mass matrix that of the configured state.
+    """
     n, motor, mobility = system.damping.shape[0], system.motor, memory.mobility
     if h <= 0.0:
         return
+    # (G + E G) times a motor's acceleration by a unit torque is the motion over the whole substep
     E, G, rest, stages = memory.half[part], memory.gain[part], memory.rest, memory.stages
     exponential(memory.linear, 0.5 * h, balanced_norm(memory.linear, n) * 0.5 * h, E, G, memory.scratch)
     N = E.shape[0]
@@ -140,9 +149,10 @@ def multiply_stage(matrix: Floats, stages: Floats, source: int, target: int) -> 
 def remainder(
     system: System, memory: Memory, x: Floats, at: int, out: int, hand: Floats, rate: int, trial: Floats
 ) -> bool:
-    """stages[out] = R(y) at y = stages[at]; False where the loops do not close there.
+    """Fill stages[out] with R(y) at y = stages[at]; False where the loops do not close there.
 
-    stages[rate] is F, and `trial` (N,) room for x + y.
+    x, hand  state (N,) at the substep's beginning, force (3,) at the handle [N];   rate  stages[rate] is F
+    trial    (N,)  room for x + y
     """
     stages, A, found = memory.stages, memory.linear, memory.rate
     N, n = x.size, system.damping.shape[0]
@@ -165,7 +175,7 @@ def remainder(
 def velocity_without_own_friction(
     system: System, memory: Memory, x: Floats, part: int, i: int, friction: Floats
 ) -> float:
-    """Velocity of motor i at the end of the substep under all frictions but its own."""
+    """Velocity of motor i at the end of the substep under all frictions (d,) but its own [rad/s]."""
     motor, stages = system.motor, memory.stages
     at = system.damping.shape[0] + motor[i]
     velocity = x[at] + stages[1, at]
@@ -176,7 +186,7 @@ def velocity_without_own_friction(
 
 
 @compiled_lean
-def law_of_bristles(system: System, i: int) -> tuple[float, float, float, float, float]:
+def bristle_law(system: System, i: int) -> tuple[float, float, float, float, float]:
     """C, F_s, v_s, sigma_0 and sigma_1 of motor i's friction, as `plant_step.bristle_force` takes them."""
     numbers = system.friction
     return numbers[i, 0], numbers[i, 1], numbers[i, 2], numbers[i, 3], numbers[i, 4]
@@ -186,7 +196,7 @@ def law_of_bristles(system: System, i: int) -> tuple[float, float, float, float,
 def solve_friction(
     system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats
 ) -> None:
-    """The drives' frictions (d,) held over the substep, from the motors' velocities without them at its end.
+    """Fill `friction` (d,) with what is held over the substep, from the motors' velocities without it at its end.
 
     stages[0] is F without friction, stages[1] the linear motion that follows. The drives move each other, so their
     frictions are found in turn until they stay. resting (d,): 1 where a motor ends the substep at rest.
@@ -205,11 +215,11 @@ def solve_friction(
             v0, w = x[n + motor[i]], velocity_without_own_friction(system, memory, x, part, i, friction)
             before, m = friction[i], mobility[part, i, i]
             if model[i] == DRY:
-                friction[i] = coulomb_force(numbers[i, 0], v0, w, m)
+                friction[i] = coulomb_force(numbers[i, COULOMB_LEVEL], v0, w, m)
                 # dry friction that stops the motor: the velocity is 0 up to rounding
                 resting[i] = 1.0 if abs(w + m * friction[i]) <= AT_REST * (abs(w) + abs(v0)) else 0.0
             else:
-                friction[i], _after = bristle_force(bristles[i], law_of_bristles(system, i), v0, w, m, h)
+                friction[i], _after = bristle_force(bristles[i], bristle_law(system, i), v0, w, m, h)
             change, most = max(change, abs(friction[i] - before)), max(most, abs(friction[i]))
         if change <= 1e-14 * most:
             break
@@ -217,7 +227,7 @@ def solve_friction(
         # the bristles' deflection is moved on once, by the frictions that are found, and not in every sweep
         if model[i] == BRISTLES:
             v0, w = x[n + motor[i]], velocity_without_own_friction(system, memory, x, part, i, friction)
-            law, m = law_of_bristles(system, i), mobility[part, i, i]
+            law, m = bristle_law(system, i), mobility[part, i, i]
             _force, bristles[i] = bristle_force(bristles[i], law, v0, w, m, h)
 
 
@@ -225,13 +235,16 @@ def solve_friction(
 def add_friction(
     system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats
 ) -> None:
-    """Find the frictions, let them act over the substep, and add what they do to F in stages[0]."""
+    """Find the frictions (d,), let them act over the substep, and add what they do to F in stages[0].
+
+    resting  (d,)  becomes 1 where a motor ends the substep at rest
+    """
     stages, E, G, rest = memory.stages, memory.half[part], memory.gain[part], memory.rest
     motor, n = system.motor, system.damping.shape[0]
     multiply_stage(G, stages, 0, 2)
     multiply_stage(E, stages, 2, 1)
     for i in range(x.size):
-        stages[1, i] += stages[2, i]
+        stages[1, i] += stages[2, i]  # (G + E G) F
     solve_friction(system, memory, x, part, h, resting, friction)
     for i in range(n):
         rest[i] = 0.0
@@ -244,8 +257,14 @@ def add_friction(
 
 
 @compiled_lean
-def release(system: System, memory: Memory, x: Floats, trial: Floats, resting: Floats, friction: Floats) -> float:
-    """End the substep from x to `trial`: motors that rest do so exactly. The work against friction [J]."""
+def end_friction(
+    system: System, memory: Memory, x: Floats, trial: Floats, resting: Floats, friction: Floats
+) -> float:
+    """End the substep from x to `trial` (N,): motors that rest do so exactly, and friction is held no more.
+
+    resting   (d,)  1 where a motor ends the substep at rest;   friction (d,)  torques held over it [N m]
+    Returns   the work against friction [J]
+    """
     motor, n, work = system.motor, system.damping.shape[0], 0.0
     for i in range(motor.size):
         at = motor[i]
@@ -281,11 +300,12 @@ def step_mechanism(
     accelerate(system, memory, x, hand)
     for i in range(N):
         stages[0, i] = rate[i]
-    rough = False
+    has_friction = False
     for i in range(system.friction_model.size):
-        rough = rough or system.friction_model[i] != 0
-    if rough:
+        has_friction = has_friction or system.friction_model[i] != 0
+    if has_friction:
         add_friction(system, memory, x, part, h, resting, friction)
+    # stages: 0 F, 1 y, 2 (G + E G) F, 3 R(y), 4 E times one of them, 5 R(y_2) + R(y_3)
     multiply_stage(G, stages, 0, 1)  # y_2
     multiply_stage(E, stages, 1, 2)
     for i in range(N):
@@ -305,7 +325,7 @@ def step_mechanism(
     multiply_stage(E, stages, 5, 4)
     for i in range(N):
         trial[i] = x[i] + stages[2, i] + h / 6.0 * (2.0 * stages[4, i] + stages[3, i])
-    work = release(system, memory, x, trial, resting, friction) if rough else 0.0
+    work = end_friction(system, memory, x, trial, resting, friction) if has_friction else 0.0
     for i in range(N):
         x[i] = trial[i]
     return work
@@ -343,6 +363,7 @@ def accelerate(system: System, memory: Memory, x: Floats, hand: Floats) -> None:
     """x' at a configured state into `memory.rate`, under the held forces and a force (3,) at the handle."""
     rate, rest, hold, J, c = memory.rate, memory.rest, memory.hold, memory.jacobian, memory.bias
     speeds, command = memory.speeds, memory.command
+    # `rest` becomes the sum of all forces in the equations of `system`; c: velocity forces and gravity
     motor, spring, cubic, excess, B = system.motor, system.spring, system.cubic, system.excess, system.damping
     d, n, lags = system.mech.driven, system.damping.shape[0], system.lag_time.size
     for i in range(d):
@@ -355,11 +376,11 @@ def accelerate(system: System, memory: Memory, x: Floats, hand: Floats) -> None:
         rest[i] = total
     along, damping, time = system.lag_along, system.lag_damping, system.lag_time
     for k in range(lags):
-        s, speed = x[2 * n + k], 0.0
+        torque, speed = x[2 * n + k], 0.0
         for i in range(n):
-            rest[i] += along[k, i] * s
+            rest[i] += along[k, i] * torque
             speed += along[k, i] * x[n + i]
-        rate[2 * n + k] = (command[k] - damping[k] * speed - s) / time[k]
+        rate[2 * n + k] = (command[k] - damping[k] * speed - torque) / time[k]
     for i in range(d):
         rest[i] += J[0, 0, i] * hand[0] + J[0, 1, i] * hand[1] + J[0, 2, i] * hand[2] - c[i]
         # motor[i] is the drive's own motor coordinate; with a rigid drive it is the joint itself
@@ -378,7 +399,7 @@ def accelerate(system: System, memory: Memory, x: Floats, hand: Floats) -> None:
 
 @compiled_lean
 def solve_small(system: System, memory: Memory, forces: Floats, first: int) -> None:
-    """M^-1 times the forces (n,) that stand in an array from `first` on, in place."""
+    """M^-1 times the forces (n,) that stand in an array from `first` on, in place, by Cholesky's factor."""
     L, motor, rotor = memory.factor, system.motor, system.rotor
     d = motor.size
     for i in range(d):

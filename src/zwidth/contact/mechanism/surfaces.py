@@ -22,6 +22,10 @@ BALL_HOLLOW: Final = 3
 BOX: Final = 4
 BOX_HOLLOW: Final = 5
 ORTHONORMAL: Final = 1e-9
+# Places in a packed surface: its kind, whether a plane acts on both sides, and a point of it or its center (3).
+# Behind these (from SIZES on): a plane's normal (3); a ball's radius; half sizes of a box (3), from AXES on its
+# axes, one after the other (9).
+KIND, TWO_SIDED, POINT, SIZES, AXES, NUMBERS = 0, 1, 2, 5, 8, 17
 
 
 @dataclass(frozen=True)
@@ -83,37 +87,38 @@ def surface_document(surface: Surface, two_sided: bool) -> dict[str, Any]:
 
 
 def packed(surface: Surface | None) -> Floats:
-    """The surface for the kernels, (17,): kind, two-sided, then its numbers.
+    """The surface as numbers for the kernels, (17,), see KIND to AXES.
 
     Raises  ValueError  for numbers that describe no surface
     """
-    out = np.zeros(17)
+    numbers = np.zeros(NUMBERS)
     match surface:
         case None:
-            out[0] = NONE
+            numbers[KIND] = NONE
         case Plane():
             normal = _vector("the plane's normal", surface.normal)
             length = float(np.linalg.norm(normal))
             if not length > 0.0:
                 raise ValueError("the plane's normal has no length; give the direction out of the wall")
-            out[0], out[1] = PLANE, float(surface.two_sided)
-            out[2:5], out[5:8] = _vector("the plane's point", surface.point), normal / length
+            numbers[KIND], numbers[TWO_SIDED] = PLANE, float(surface.two_sided)
+            numbers[POINT:SIZES] = _vector("the plane's point", surface.point)
+            numbers[SIZES:AXES] = normal / length
         case Sphere():
             if not (np.isfinite(surface.radius) and surface.radius > 0.0):
                 raise ValueError(f"the sphere's radius must be positive [m], got {surface.radius}")
-            out[0] = BALL_HOLLOW if surface.hollow else BALL
-            out[2:5], out[5] = _vector("the sphere's center", surface.center), surface.radius
+            numbers[KIND] = BALL_HOLLOW if surface.hollow else BALL
+            numbers[POINT:SIZES], numbers[SIZES] = _vector("the sphere's center", surface.center), surface.radius
         case Box():
-            out[0] = BOX_HOLLOW if surface.hollow else BOX
-            out[2:5] = _vector("the box's center", surface.center)
+            numbers[KIND] = BOX_HOLLOW if surface.hollow else BOX
+            numbers[POINT:SIZES] = _vector("the box's center", surface.center)
             half = np.array([*surface.half_sizes, np.inf][:3], dtype=np.float64)
             if half.shape != (3,) or not np.all(half > 0.0):
                 raise ValueError(f"the box's half_sizes must be two or three positive lengths [m], got {half}")
             axes = np.eye(3) if surface.axes is None else np.asarray(surface.axes, dtype=np.float64)
             if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), rtol=0.0, atol=ORTHONORMAL):
                 raise ValueError("the box's axes must be a (3, 3) rotation matrix, its axes as columns")
-            out[5:8], out[8:17] = half, axes.T.ravel()
-    return out
+            numbers[SIZES:AXES], numbers[AXES:] = half, axes.T.ravel()
+    return numbers
 
 
 def depth_and_normal(surface: Surface, position: Sequence[float] | Floats) -> tuple[Floats, Floats]:
@@ -149,32 +154,35 @@ def _depths(surface: Floats, position: Floats, depth: Floats, normal: Floats) ->
 
 @compiled_lean
 def penetration(surface: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Depth [m] and normal of one point, the surface as `packed` gives it; -inf for no surface."""
-    kind = surface[0]
-    dx, dy, dz = x - surface[2], y - surface[3], z - surface[4]
+    """Depth [m] of one point, and the normal's x, y and z there, for a surface as `packed` gives it.
+
+    Depth -inf for no surface, the normal then and at a ball's center 0.
+    """
+    kind = surface[KIND]
+    dx, dy, dz = x - surface[POINT], y - surface[POINT + 1], z - surface[POINT + 2]
     if kind == PLANE:
-        nx, ny, nz = surface[5], surface[6], surface[7]
+        nx, ny, nz = surface[SIZES], surface[SIZES + 1], surface[SIZES + 2]
         return -(dx * nx + dy * ny + dz * nz), nx, ny, nz
     if kind in (BALL, BALL_HOLLOW):
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
         sign = 1.0 if kind == BALL else -1.0
         scale = sign / length if length > 0.0 else 0.0
-        return sign * (surface[5] - length), scale * dx, scale * dy, scale * dz
+        return sign * (surface[SIZES] - length), scale * dx, scale * dy, scale * dz
     if kind in (BOX, BOX_HOLLOW):
-        depth, nx, ny, nz = _box(surface, dx, dy, dz)
+        depth, nx, ny, nz = _depth_in_box(surface, dx, dy, dz)
         return (depth, nx, ny, nz) if kind == BOX else (-depth, -nx, -ny, -nz)
     return -np.inf, 0.0, 0.0, 0.0
 
 
 @compiled_lean
-def _box(surface: Floats, dx: float, dy: float, dz: float) -> tuple[float, float, float, float]:
-    """Depth in a solid box and the way out, for a point (dx, dy, dz) from its center."""
+def _depth_in_box(surface: Floats, dx: float, dy: float, dz: float) -> tuple[float, float, float, float]:
+    """Depth in a solid box [m] and x, y, z of the unit vector out, of a point (dx, dy, dz) [m] from its center."""
     nearest, face, side, squared = -np.inf, 0, 1.0, 0.0
     nx, ny, nz = 0.0, 0.0, 0.0
     for i in range(3):
-        ax, ay, az = surface[8 + 3 * i], surface[9 + 3 * i], surface[10 + 3 * i]
+        ax, ay, az = surface[AXES + 3 * i], surface[AXES + 1 + 3 * i], surface[AXES + 2 + 3 * i]
         along = dx * ax + dy * ay + dz * az
-        over = abs(along) - surface[5 + i]
+        over = abs(along) - surface[SIZES + i]  # beyond the face, negative inside
         sign = 1.0 if along >= 0.0 else -1.0
         if over > nearest:
             nearest, face, side = over, i, sign
@@ -185,7 +193,7 @@ def _box(surface: Floats, dx: float, dy: float, dz: float) -> tuple[float, float
     if squared > 0.0:
         distance = np.sqrt(squared)
         return -distance, nx / distance, ny / distance, nz / distance
-    i = 8 + 3 * face
+    i = AXES + 3 * face
     return -nearest, side * surface[i], side * surface[i + 1], side * surface[i + 2]
 
 

@@ -109,7 +109,7 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
            of joints and motors
     """
     d, n = len(drives.names), plant.size
-    n2 = drives.transmission**2
+    n2 = drives.transmission**2  # brings a motor's numbers to the joint
     flexible = np.isfinite(drives.stiffness)
     motor = np.arange(d)
     motor[flexible] = np.arange(d, n)
@@ -179,26 +179,26 @@ def motion_memory(system: System) -> Memory:
     mech = system.mech
     d, n, N = mech.driven, system.damping.shape[0], 2 * system.damping.shape[0] + system.lag_time.size
     return Memory(
-        working_memory(mech),
-        new_link_accelerations(mech),
-        np.zeros(mech.parent.size),
-        np.zeros((1, d, d)),
-        np.zeros((1, 3, d)),
-        np.zeros((1, 3, d)),
-        np.zeros(d),
-        np.zeros((d, d)),
-        np.zeros(d),
-        np.zeros(n),
-        np.zeros(N - 2 * n),
-        np.zeros(n),
-        np.zeros(N),
-        np.zeros((2, N, N)),
-        np.zeros((2, N, N)),
-        np.zeros((2, d, d)),
-        np.zeros((3, N, N)),
-        np.zeros((mech.joint.size, mech.joint.size)),
-        np.zeros((N, N)),
-        np.zeros(d),
-        np.zeros((6, N)),
-        np.zeros(d),
+        work=working_memory(mech),
+        flow=new_link_accelerations(mech),
+        angles=np.zeros(mech.parent.size),
+        mass=np.zeros((1, d, d)),
+        jacobian=np.zeros((1, 3, d)),
+        angular_jacobian=np.zeros((1, 3, d)),
+        bias=np.zeros(d),
+        factor=np.zeros((d, d)),
+        speeds=np.zeros(d),
+        hold=np.zeros(n),
+        command=np.zeros(N - 2 * n),
+        rest=np.zeros(n),
+        rate=np.zeros(N),
+        half=np.zeros((2, N, N)),
+        gain=np.zeros((2, N, N)),
+        mobility=np.zeros((2, d, d)),
+        scratch=np.zeros((3, N, N)),
+        square=np.zeros((mech.joint.size, mech.joint.size)),
+        linear=np.zeros((N, N)),
+        base=np.zeros(d),
+        stages=np.zeros((6, N)),
+        bristles=np.zeros(d),
     )
