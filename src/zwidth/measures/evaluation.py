@@ -8,20 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth import errors
 from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
-from zwidth.errors import (
-    ChartError,
-    EquilibriumError,
-    HysteresisError,
-    MeasureError,
-    MissingNumbersError,
-    ModelError,
-    NoMechanismError,
-    NonlinearError,
-    NoValueError,
-    UnmovedError,
-)
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import (
@@ -43,7 +32,13 @@ FAILURES = (
     SystemExit,
 )  # a user's measure that calls exit() counts as failed, like any other error in it
 NO_MECHANISM = "needs a [mechanism]; this device gives its [plant] only"
-NO_VALUE_ERRORS = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
+NO_VALUE_ERRORS = (
+    errors.NoValueError,
+    errors.ModelError,
+    errors.UnmovedError,
+    errors.HysteresisError,
+    errors.NonlinearError,
+)
 
 
 def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
@@ -60,12 +55,12 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
         return evaluate_pointwise(measure.compute, point)
     try:
         result = measure.compute(point)
-    except MeasureError:
+    except errors.MeasureError:
         raise
-    except NoMechanismError:
-        raise MeasureError(NO_MECHANISM) from None
-    except MissingNumbersError as error:
-        raise MeasureError(str(error)) from None
+    except errors.NoMechanismError:
+        raise errors.MeasureError(NO_MECHANISM) from None
+    except errors.MissingNumbersError as error:
+        raise errors.MeasureError(str(error)) from None
     except FAILURES as error:
         return _same_status(point, FAILED, _error_text(error))
     if isinstance(result, MeasureValues):
@@ -130,7 +125,7 @@ def measure_at(
             None if colliding_links is None else tuple(colliding_links),
         )
         return evaluate(resolved.at_wall(wanted), point)
-    except MeasureError as error:
+    except errors.MeasureError as error:
         raise error.with_name(resolved.name) from None
 
 
@@ -224,17 +219,17 @@ def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
             reason = result.notes[0].reason if result.notes else ""
             return float(result.values), int(result.status), reason
         value = np.asarray(result)
-    except MeasureError:
+    except errors.MeasureError:
         raise
-    except NoMechanismError:
-        raise MeasureError(NO_MECHANISM) from None
-    except MissingNumbersError as error:
-        raise MeasureError(str(error)) from None
+    except errors.NoMechanismError:
+        raise errors.MeasureError(NO_MECHANISM) from None
+    except errors.MissingNumbersError as error:
+        raise errors.MeasureError(str(error)) from None
     except NO_VALUE_ERRORS as error:
         return float("nan"), NO_VALUE, str(error)
-    except EquilibriumError as error:
+    except errors.EquilibriumError as error:
         return float("nan"), NO_EQUILIBRIUM, str(error)
-    except ChartError as error:
+    except errors.ChartError as error:
         return float("nan"), UNDECIDED, str(error)
     except FAILURES as error:
         return float("nan"), FAILED, _error_text(error)

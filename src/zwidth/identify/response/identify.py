@@ -18,8 +18,7 @@ from zwidth.chart.measured.chart import MeasuredChart, hidden_walls, measured_ch
 from zwidth.device.device import Device
 from zwidth.errors import ResponseError
 from zwidth.identify.identification import Check, Estimate, Identification, refused
-from zwidth.identify.modes.checks import FACTORS_LINEAR, NEAR, flip_check, order_check
-from zwidth.identify.modes.identify import FEW_LEVELS
+from zwidth.identify.modes.checks import FACTORS_LINEAR, FEW_LEVELS, NEAR, flip_check, order_check
 from zwidth.identify.modes.model import sampled_response
 from zwidth.identify.records.record import Columns, Record
 from zwidth.identify.records.sampling import SampleTimes, check_sampling

@@ -27,28 +27,15 @@ from matplotlib.axes import Axes
 from zwidth.identify.identification import Identification
 from zwidth.identify.joint.friction import JointIdentification
 from zwidth.model.response import relative_error
+from zwidth.show.figures import style
 from zwidth.show.figures.stability import frame
-from zwidth.show.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LINES,
-    ORANGE,
-    PURPLE,
-    VERMILION,
-    draw_empty,
-    label,
-    legend_above,
-    number_logarithmic,
-)
 from zwidth.show.units import quantity, spoken_unit
 
 
 def draw_identification(ax: Axes, result: Identification) -> None:
     """One identification into axes; where nothing was fitted the reason."""
     if result.reason is not None:
-        draw_empty(ax, "nothing was fitted")
+        style.draw_empty(ax, "nothing was fitted")
         return
     DRAWINGS[result.kind](ax, result)
 
@@ -67,7 +54,7 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
     curves = identification.curves
     measured = [name for name in curves if name.startswith(MEASURED)]
     if not measured:
-        draw_empty(ax, identification.reason or "nothing was fitted")
+        style.draw_empty(ax, identification.reason or "nothing was fitted")
         return
     first_samples = slice(0, SHOWN)
     time = np.asarray(curves["time_s"])[first_samples]
@@ -78,9 +65,9 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
         predicted = np.asarray(curves[name.replace(MEASURED, PREDICTED, 1)])[first_samples]
         scale = float(np.max(np.abs(torque), initial=0.0)) or 1.0
         zero = -2.0 * APART * k
-        colour, dashes = LINES[1 + k % (len(LINES) - 1)]
-        ax.axhline(zero, color=BLACK, linewidth=0.4)
-        ax.plot(time, zero + torque / scale, color=BLACK, linewidth=0.9, label="measured" if k == 0 else "")
+        colour, dashes = style.LINES[1 + k % (len(style.LINES) - 1)]
+        ax.axhline(zero, color=style.BLACK, linewidth=0.4)
+        ax.plot(time, zero + torque / scale, color=style.BLACK, linewidth=0.9, label="measured" if k == 0 else "")
         ax.plot(
             time,
             zero + predicted / scale,
@@ -90,19 +77,19 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
         )
     ax.set_yticks([-2.0 * APART * k for k in range(len(measured))])
     ax.set_yticklabels(["0"] * len(measured))
-    label(ax.xaxis, "Time", "s")
+    style.label(ax.xaxis, "Time", "s")
     ax.set_ylabel("Torque over its largest")
     for text in identification.left_out[:1]:
         ax.text(0.01, 0.01, text.partition(":")[0], transform=ax.transAxes, fontsize=6.5)
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 # kinds of points: marker, colour, whether it is filled, and title
 POINT_STYLES = (
-    (("lower", "upper", "edge"), "o", VERMILION, False, "measured edge, damping bisected"),
-    (("tip",), "^", GREEN, False, "measured tip, stiffness bisected"),
-    (("stable",), "P", BLUE, True, "tried, stable"),
-    (("unstable",), "X", BLACK, False, "tried, unstable"),
+    (("lower", "upper", "edge"), "o", style.VERMILION, False, "measured edge, damping bisected"),
+    (("tip",), "^", style.GREEN, False, "measured tip, stiffness bisected"),
+    (("stable",), "P", style.BLUE, True, "tried, stable"),
+    (("unstable",), "X", style.BLACK, False, "tried, unstable"),
 )
 MARGIN = 0.12  # of the points' extent that is shown beyond them
 
@@ -110,16 +97,16 @@ MARGIN = 0.12  # of the points' extent that is shown beyond them
 def draw_boundary(ax: Axes, identification: Identification) -> None:
     """The boundary as fitted, and as the file had it, with the measured points and bars to the fitted edge."""
     if not identification.curves:
-        draw_empty(ax, identification.reason or "nothing was fitted")
+        style.draw_empty(ax, identification.reason or "nothing was fitted")
         return
-    _draw_outline(ax, identification.details["boundary_before"], GREY, (0, (4, 2)), "chart before")
-    _draw_outline(ax, identification.details["boundary"], BLACK, "-", "chart fitted")
+    _draw_outline(ax, identification.details["boundary_before"], style.GREY, (0, (4, 2)), "chart before")
+    _draw_outline(ax, identification.details["boundary"], style.BLACK, "-", "chart fitted")
     columns = {name: np.array(values) for name, values in identification.curves.items()}
     K, B, kind = columns["stiffness_N_per_m"], columns["damping_Ns_per_m"], columns["kind"]
     fitted = columns["fitted_stiffness_N_per_m"], columns["fitted_damping_Ns_per_m"]
     on_edge = np.isfinite(fitted[0])
     for k in np.flatnonzero(on_edge):
-        ax.plot([K[k], fitted[0][k]], [B[k], fitted[1][k]], color=VERMILION, linewidth=1.0, zorder=3.0)
+        ax.plot([K[k], fitted[0][k]], [B[k], fitted[1][k]], color=style.VERMILION, linewidth=1.0, zorder=3.0)
     for kinds, marker, colour, filled, title in POINT_STYLES:
         chosen = np.isin(kind, kinds)
         if chosen.any():
@@ -135,7 +122,7 @@ def draw_boundary(ax: Axes, identification: Identification) -> None:
                 label=title,
             )
     frame(ax, _default_window(K, B), empty=False)
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 def _draw_outline(ax: Axes, arcs: Sequence[dict[str, Any]], colour: str, dashes: Any, title: str) -> None:
@@ -169,7 +156,7 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
         velocity[::stride],
         friction[::stride],
         ".",
-        color=GREY,
+        color=style.GREY,
         markersize=2.5,
         alpha=0.5,
         label="measured: force less inertia",
@@ -179,21 +166,21 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
     reach = WIDEST * float(np.max(np.abs(velocity), initial=0.0)) or 1.0
     # level of the dry friction and slope of the viscous one, by the sign of the velocity
     for (level, slope), side, colour, name in (
-        (identification.lines[0], 1.0, VERMILION, "forward"),
-        (identification.lines[1], -1.0, BLUE, "backward"),
+        (identification.lines[0], 1.0, style.VERMILION, "forward"),
+        (identification.lines[1], -1.0, style.BLUE, "backward"),
     ):
         if np.isfinite(level):
             ends = np.array([0.0, side * reach])
             ax.plot(ends, side * level + slope * ends, color=colour, linewidth=1.6, label=f"fitted {name}")
-    ax.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1.0)
-    ax.axvline(0.0, color=BLACK, linewidth=0.6, zorder=1.0)
-    label(ax.xaxis, "Velocity", "rad/s" if angular else "m/s")
+    ax.axhline(0.0, color=style.BLACK, linewidth=0.6, zorder=1.0)
+    ax.axvline(0.0, color=style.BLACK, linewidth=0.6, zorder=1.0)
+    style.label(ax.xaxis, "Velocity", "rad/s" if angular else "m/s")
     if free:
-        label(ax.yaxis, "Friction over mass", "rad/s^2" if angular else "m/s^2", plain=True)
+        style.label(ax.yaxis, "Friction over mass", "rad/s^2" if angular else "m/s^2", plain=True)
     else:
-        label(ax.yaxis, "Friction", "N m" if angular else "N")
+        style.label(ax.yaxis, "Friction", "N m" if angular else "N")
     _draw_unseen_motion(ax, identification)
-    legend_above(ax, columns=3)
+    style.legend_above(ax, columns=3)
 
 
 def _draw_unseen_motion(ax: Axes, identification: JointIdentification) -> None:
@@ -207,12 +194,14 @@ def _draw_unseen_motion(ax: Axes, identification: JointIdentification) -> None:
     breaks = np.flatnonzero((steps > 1.5 * np.median(steps)) | (steps <= 0.0))
     end = min(int(breaks[0]) + 1 if len(breaks) else len(time), SHOWN_SAMPLES)
     inset = ax.inset_axes(INSET, zorder=5.0)
-    inset.plot(time[:end], measured[:end], color=GREY, linewidth=2.2, label="measured")
-    inset.plot(time[:end], predicted[:end], color=BLACK, linewidth=0.8, label="predicted")
+    inset.plot(time[:end], measured[:end], color=style.GREY, linewidth=2.2, label="measured")
+    inset.plot(time[:end], predicted[:end], color=style.BLACK, linewidth=0.8, label="predicted")
     inset.tick_params(labelsize=6.5, length=2.0, pad=1.5)
     inset.locator_params(nbins=3)
-    label(inset.xaxis, "Time", "s")
-    label(inset.yaxis, "Angle" if identification.angular else "Position", "rad" if identification.angular else "m")
+    style.label(inset.xaxis, "Time", "s")
+    style.label(
+        inset.yaxis, "Angle" if identification.angular else "Position", "rad" if identification.angular else "m"
+    )
     for axis in (inset.xaxis, inset.yaxis):
         axis.label.set_fontsize(6.5)
         axis.labelpad = 1.0
@@ -222,14 +211,14 @@ def _draw_unseen_motion(ax: Axes, identification: JointIdentification) -> None:
     )
 
 
-STATE_STYLES = (("on", BLUE, "wall on"), ("off", VERMILION, "wall off"))
+STATE_STYLES = (("on", style.BLUE, "wall on"), ("off", style.VERMILION, "wall off"))
 FLOOR = 1e-3  # share of the magnitude below which the band's lower end is not drawn
 
 
 def draw_identified_impedance(ax: Axes, identification: Identification) -> None:
     """Magnitudes of impedance over frequency, wall on and off: measured with bands, predicted in black."""
     if not identification.curves:
-        draw_empty(ax, identification.reason or "nothing was measured")
+        style.draw_empty(ax, identification.reason or "nothing was measured")
         return
     columns = {name: np.array(values) for name, values in identification.curves.items()}
     for state, colour, title in STATE_STYLES:
@@ -248,14 +237,16 @@ def draw_identified_impedance(ax: Axes, identification: Identification) -> None:
         )
         if np.isfinite(predicted).any():
             dashes = "-" if state == "off" else (0, (5, 1.5))
-            ax.loglog(f, predicted, color=BLACK, linestyle=dashes, linewidth=0.9, label=f"predicted, {title}")
+            ax.loglog(
+                f, predicted, color=style.BLACK, linestyle=dashes, linewidth=0.9, label=f"predicted, {title}"
+            )
     f = columns["frequency_Hz"]
     ax.set_xlim(float(np.min(f)), float(np.max(f)))
-    number_logarithmic(ax.xaxis, *ax.get_xlim())
-    number_logarithmic(ax.yaxis, *ax.get_ylim())
+    style.number_logarithmic(ax.xaxis, *ax.get_xlim())
+    style.number_logarithmic(ax.yaxis, *ax.get_ylim())
     ax.set_xlabel("Frequency [Hz]")
     ax.set_ylabel(f"Impedance, magnitude [{spoken_unit('N s/m')}]")
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 GOOD = 0.6  # coherence above which a point is drawn full
@@ -266,31 +257,31 @@ def draw_modes(ax: Axes, identification: Any) -> None:
     used, the fitted one, and the natural frequencies; both axes logarithmic."""
     curves = identification.curves
     if not curves:
-        draw_empty(ax, "nothing was fitted")
+        style.draw_empty(ax, "nothing was fitted")
         return
     f, coherence = np.array(curves["frequency_Hz"]), np.array(curves["coherence"])
     measured = np.hypot(curves["measured_real"], curves["measured_imag"])
     fitted = np.hypot(curves["fitted_real"], curves["fitted_imag"])
     good = (coherence > GOOD) & np.array(curves["used"])
     for chosen, colour, text in (
-        (good, BLUE, "measured"),
-        (~good, GREY, f"measured, coherence below {GOOD:g} or not used"),
+        (good, style.BLUE, "measured"),
+        (~good, style.GREY, f"measured, coherence below {GOOD:g} or not used"),
     ):
         if np.any(chosen & (measured > 0.0)):
             ax.loglog(f[chosen], measured[chosen], ".", markersize=2.5, color=colour, label=text)
-    ax.loglog(f, fitted, color=VERMILION, label="fitted")
+    ax.loglog(f, fitted, color=style.VERMILION, label="fitted")
     for number, mode in enumerate(
         estimate for estimate in identification.estimates if estimate.name.startswith("natural frequency")
     ):
         if f[0] <= mode.value <= f[-1]:
             name = "" if number else "natural frequencies"
-            ax.axvline(mode.value, color=GREY, linewidth=0.6, linestyle=(0, (4, 2)), zorder=1.5, label=name)
+            ax.axvline(mode.value, color=style.GREY, linewidth=0.6, linestyle=(0, (4, 2)), zorder=1.5, label=name)
     ax.set_xlim(f[0], f[-1])
-    number_logarithmic(ax.xaxis, *ax.get_xlim())
+    style.number_logarithmic(ax.xaxis, *ax.get_xlim())
     ax.set_xlabel("Frequency [Hz]")
     unit = "rad/(N m)" if identification.details.get("turns") else "m/N"
     ax.set_ylabel(f"Response from command to reading [{unit}]")
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 DISK = float(np.sqrt(-2.0 * np.log(0.05)))  # deviations that hold 95 % of a circular error
@@ -311,7 +302,7 @@ def draw_response(ax: Axes, identification: Identification) -> None:
     sweep = curves.get("sweep", np.ones(len(f)))
     sweeps = np.unique(sweep)
     for number, sweep_number in enumerate(sweeps):
-        colour, dashes = LINES[number % len(LINES)]
+        colour, dashes = style.LINES[number % len(style.LINES)]
         name = f"sweep {sweep_number:g}" if len(sweeps) > 1 else "|P|"
         ax.loglog(
             f[sweep == sweep_number],
@@ -324,13 +315,13 @@ def draw_response(ax: Axes, identification: Identification) -> None:
     first = sweep == sweeps[0]
     ends = (magnitude * (1.0 - error))[first], (magnitude * (1.0 + error))[first]
     text = "95 % at each frequency" + (f", sweep {sweeps[0]:g}" if len(sweeps) > 1 else "")
-    ax.fill_between(f[first], *ends, color=BLUE, alpha=0.25, linewidth=0.0, label=text)
+    ax.fill_between(f[first], *ends, color=style.BLUE, alpha=0.25, linewidth=0.0, label=text)
     poor = coherence < COHERENT
     if poor.any():
         ax.plot(
             f[poor],
             magnitude[poor],
-            color=VERMILION,
+            color=style.VERMILION,
             marker="x",
             markersize=3.0,
             linestyle="none",
@@ -342,14 +333,14 @@ def draw_response(ax: Axes, identification: Identification) -> None:
     if len(seen):
         ax.set_ylim(float(seen.min()) / BESIDE, float(seen.max()) * BESIDE)
     ax.set_xlim(float(np.min(f)), float(np.max(f)))
-    number_logarithmic(ax.xaxis, *ax.get_xlim())
+    style.number_logarithmic(ax.xaxis, *ax.get_xlim())
     ax.set_xlabel("Frequency [Hz]")
     ax.set_ylabel("Position over force [m/N]")
-    ax.grid(color=GREY, alpha=0.2, linewidth=0.5)
-    legend_above(ax, columns=3)
+    ax.grid(color=style.GREY, alpha=0.2, linewidth=0.5)
+    style.legend_above(ax, columns=3)
 
 
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE)
+COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE)
 
 
 def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
@@ -359,7 +350,7 @@ def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
     for number, drive in enumerate(drives):
         of_drive = curves["drive"] == drive
         name = f"{drive}, " if len(drives) > 1 else ""
-        colour = COLOURS[number % len(COLOURS)] if len(drives) > 1 else BLUE
+        colour = COLOURS[number % len(COLOURS)] if len(drives) > 1 else style.BLUE
         for fitted, word in ((1.0, "fitted"), (0.0, "predicted")):
             shown = of_drive & (curves["fitted"] == fitted)
             ax.scatter(
@@ -372,11 +363,11 @@ def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
                 label=f"{name}measured, {word}",
             )
         _draw_spring(ax, curves, of_drive, "fitted spring and friction" if number == 0 else "")
-    ax.axhline(0.0, color=GREY, linewidth=0.6)
-    ax.axvline(0.0, color=GREY, linewidth=0.6)
-    label(ax.xaxis, "Angle at the motor's shaft", "rad")
-    label(ax.yaxis, "Torque", "N m")
-    legend_above(ax, columns=3)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.6)
+    ax.axvline(0.0, color=style.GREY, linewidth=0.6)
+    style.label(ax.xaxis, "Angle at the motor's shaft", "rad")
+    style.label(ax.yaxis, "Torque", "N m")
+    style.legend_above(ax, columns=3)
 
 
 def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], of_drive: np.ndarray, text: str) -> None:
@@ -388,7 +379,11 @@ def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], of_drive: np.ndarray, 
     angle, torque = curves["angle_rad"][of_drive], curves["fitted_torque_Nm"][of_drive]
     for number, (first, behind) in enumerate(pairwise([0, *starts.tolist(), len(angle)])):
         ax.plot(
-            angle[first:behind], torque[first:behind], color=BLACK, linewidth=0.9, label="" if number else text
+            angle[first:behind],
+            torque[first:behind],
+            color=style.BLACK,
+            linewidth=0.9,
+            label="" if number else text,
         )
 
 

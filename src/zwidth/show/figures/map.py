@@ -30,20 +30,7 @@ from zwidth.measures.definition import (
     STATUS,
     UNDECIDED,
 )
-from zwidth.show.figures.style import (
-    BLACK,
-    GREY,
-    LARGEST,
-    LINES,
-    STABLE,
-    VERMILION,
-    bands_of,
-    colour_bar,
-    draw_empty,
-    figure,
-    label,
-    legend_above,
-)
+from zwidth.show.figures import style
 from zwidth.show.mechanism_scene import drawn_links, joint_points, link_stroke
 from zwidth.show.units import area_text, as_written, percent, quantity, spoken_unit
 from zwidth.study.workspace.map import continued, reach_outline
@@ -87,7 +74,7 @@ def map_figure(
     ratio = (view[3] - view[2]) / (view[1] - view[0])
     width = 6.2 if ratio < 1.4 else 4.6
     lines = 1 + (len(area.requirements) + 1 if area is not None else 0)
-    drawing, ax = figure(width, float(np.clip(0.72 * width * ratio, 2.2, 8.0)) + 0.75 + 0.17 * lines)
+    drawing, ax = style.figure(width, float(np.clip(0.72 * width * ratio, 2.2, 8.0)) + 0.75 + 0.17 * lines)
     drawing.set_layout_engine("compressed")  # axes of equal scales leave room that the labels need
     draw_map(ax, dataset, name, device, area)
     return drawing
@@ -107,7 +94,7 @@ def draw_map(
     handles: list[Any] = []
     values = dataset[name].values
     outline = reach_outline(dataset, name)
-    if (np.abs(values) <= LARGEST).any():
+    if (np.abs(values) <= style.LARGEST).any():
         drawn = values if outline is None else continued(values, dataset[f"{name}_status"].values)
         _draw_contours(ax, x, y, values, drawn, str(about["title"]), unit, faint=area is not None, outline=outline)
     elif not np.isnan(values).all():
@@ -166,11 +153,11 @@ def _draw_contours(
     drawn    the values, continued beyond that edge
     outline  what is reached; None: known to a cell
     """
-    levels, norm, colours = bands_of(values, faint=faint)
+    levels, norm, colours = style.bands_of(values, faint=faint)
     extend: Any = norm.extend
     # infinite values are drawn as twice the largest finite one, beyond every level
     beyond_all = 2.0 * max(
-        float(np.abs(values[np.abs(values) <= LARGEST]).max()), *np.abs(levels[[0, -1]]).tolist()
+        float(np.abs(values[np.abs(values) <= style.LARGEST]).max()), *np.abs(levels[[0, -1]]).tolist()
     )
     heights = np.ma.masked_invalid(np.clip(drawn, -beyond_all, beyond_all))
     bands = ax.contourf(
@@ -179,12 +166,12 @@ def _draw_contours(
     lines = ax.contour(x, y, heights, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
     if paths := _outline_paths(outline) if outline is not None else []:
         edge = PathPatch(
-            Path.make_compound_path(*paths), facecolor="none", edgecolor=GREY, linewidth=0.6, zorder=1.2
+            Path.make_compound_path(*paths), facecolor="none", edgecolor=style.GREY, linewidth=0.6, zorder=1.2
         )
         ax.add_patch(edge)
         for drawing in (bands, lines):
             drawing.set_clip_path(edge)
-    colour_bar(ax, levels, norm, colours, title, unit)
+    style.colour_bar(ax, levels, norm, colours, title, unit)
 
 
 def _fill_infinite(ax: Axes, x: Floats, y: Floats, values: Floats, title: str) -> list[Any]:
@@ -205,9 +192,9 @@ def _status_hatches(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -
         has_status = (status == kind).astype(float)
         if has_status.any():
             drawn = ax.contourf(x, y, has_status, levels=[0.5, 1.5], hatches=[hatch], **with_hatches)
-            drawn.set_edgecolor(GREY)
+            drawn.set_edgecolor(style.GREY)
             drawn.set_linewidth(0.0)
-            handles.append(Patch(facecolor="white", edgecolor=GREY, hatch=hatch, linewidth=0.5, label=text))
+            handles.append(Patch(facecolor="white", edgecolor=style.GREY, hatch=hatch, linewidth=0.5, label=text))
     return handles
 
 
@@ -228,7 +215,7 @@ def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
     if not len(ends):
         return []
     halo = [withStroke(linewidth=2.4, foreground="white")]
-    drawn = LineCollection(list(ends), colors=BLACK, linewidths=1.1, zorder=2.4, path_effects=halo)
+    drawn = LineCollection(list(ends), colors=style.BLACK, linewidths=1.1, zorder=2.4, path_effects=halo)
     drawn.set_label(f"{dataset.attrs['direction']} direction")
     ax.add_collection(drawn)
     return [drawn]
@@ -248,26 +235,28 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
     handles: list[Any] = []
     required = zip(area.requirements, area.units, area.regions, strict=True)
     for n, (requirement, unit, region) in enumerate(required):
-        colour, dashes = LINES[1 + n % (len(LINES) - 1)]
+        colour, dashes = style.LINES[1 + n % (len(style.LINES) - 1)]
         hatch = HATCHES[n % len(HATCHES)]
         measure = requirement.measure
         sign = "\u2265" if requirement.at_least else "\u2264"
         bound = as_written(requirement.value, unit)
         text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
-        style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
+        outline: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
         for path in _outline_paths(region.shape):
             # hatches take the edge's colour: once for them, faint, and once for the outline
             ax.add_patch(
                 PathPatch(path, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.0, alpha=0.45)
             )
-            ax.add_patch(PathPatch(path, zorder=2.2, **style))
-        handles.append(Patch(hatch=hatch, label=text, **style))
+            ax.add_patch(PathPatch(path, zorder=2.2, **outline))
+        handles.append(Patch(hatch=hatch, label=text, **outline))
     dotted: dict[str, Any] = {"linestyle": (0, (0.1, 1.6)), "linewidth": 3.2}
     for path in _outline_paths(area.common.shape):
-        ax.add_patch(PathPatch(path, facecolor="none", edgecolor=BLACK, zorder=2.6, capstyle="round", **dotted))
+        ax.add_patch(
+            PathPatch(path, facecolor="none", edgecolor=style.BLACK, zorder=2.6, capstyle="round", **dotted)
+        )
     share = f"{percent(area.common.share)} of the reachable area"
     text = f"Common area: {area_text(area.common.area)}, {share}"
-    handles.append(Line2D([], [], color=BLACK, dash_capstyle="round", label=text, **dotted))
+    handles.append(Line2D([], [], color=style.BLACK, dash_capstyle="round", label=text, **dotted))
     return handles
 
 
@@ -306,10 +295,15 @@ def _draw_mechanism(ax: Axes, mechanism: ProjectedMechanism) -> None:
     strokes, joints, handle = mechanism
     halo = [withStroke(linewidth=3.4, foreground="white")]
     for stroke in strokes:
-        ax.plot(*stroke.T, color=BLACK, linewidth=1.6, solid_capstyle="round", path_effects=halo, zorder=3.0)
-    round_: dict[str, Any] = {"marker": "o", "markersize": 5.0, "color": "white", "markeredgecolor": BLACK}
+        ax.plot(*stroke.T, color=style.BLACK, linewidth=1.6, solid_capstyle="round", path_effects=halo, zorder=3.0)
+    round_: dict[str, Any] = {"marker": "o", "markersize": 5.0, "color": "white", "markeredgecolor": style.BLACK}
     ax.plot(*joints.T, linestyle="none", zorder=3.1, **round_)
-    square: dict[str, Any] = {"marker": "D", "markersize": 6.0, "color": VERMILION, "markeredgecolor": "white"}
+    square: dict[str, Any] = {
+        "marker": "D",
+        "markersize": 6.0,
+        "color": style.VERMILION,
+        "markeredgecolor": "white",
+    }
     ax.plot(*handle[:, None], linestyle="none", zorder=3.2, **square)
 
 
@@ -321,7 +315,7 @@ def _draw_rendered_direction(ax: Axes, mechanism: ProjectedMechanism, dataset: x
     if not np.linalg.norm(on_plane) > 1e-6:
         return
     size = 0.13 * float(np.ptp(np.vstack([*strokes, handle[None]]), axis=0).max())
-    look = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+    look = {"arrowstyle": "-|>", "color": style.VERMILION, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", xy=tuple(handle + size * on_plane), xytext=tuple(handle), arrowprops=look, zorder=3.3)
 
 
@@ -340,15 +334,15 @@ def _frame(ax: Axes, view: tuple[float, ...], first: str, second: str) -> None:
     ax.set_xlim(view[0], view[1])
     ax.set_ylim(view[2], view[3])
     ax.set_aspect("equal")
-    label(ax.xaxis, first, "m", plain=True)
-    label(ax.yaxis, second, "m", plain=True)
+    style.label(ax.xaxis, first, "m", plain=True)
+    style.label(ax.yaxis, second, "m", plain=True)
 
 
 def draw_safe_walls(ax: Axes, table: SafeWalls) -> None:
     """The largest stiffness of each cell's rectangle, white where there is none; of cells in space those of the
     middle layer. Without a workspace: the bands of stiffness with their ranges of damping, and the rectangle."""
     if not (table.level > 0).any():
-        draw_empty(ax, "no cell has safe walls")
+        style.draw_empty(ax, "no cell has safe walls")
     elif table.grid.dimensions == 0:
         _draw_bands(ax, table)
     else:
@@ -366,16 +360,16 @@ def _draw_cells(ax: Axes, table: SafeWalls) -> None:
         middle = 0.5 * float(grid.lines(2)[layer] + grid.lines(2)[layer + 1])
         K, status, name = K[layer], status[layer], f", {grid.names[2]} = {middle:.4g} m"
     if np.isnan(K).all():
-        draw_empty(ax, f"no cell has safe walls{name}")
+        style.draw_empty(ax, f"no cell has safe walls{name}")
         return
-    levels, norm, colours = bands_of(K)
+    levels, norm, colours = style.bands_of(K)
     cells = np.ma.masked_invalid(K)
     ax.pcolormesh(*lines, cells, cmap=colours, norm=norm, edgecolors="white", linewidth=CELL_EDGE)
-    colour_bar(ax, levels, norm, colours, f"Safe stiffness, every direction{name}", spoken_unit("N/m"))
+    style.colour_bar(ax, levels, norm, colours, f"Safe stiffness, every direction{name}", spoken_unit("N/m"))
     marked = hatch_cells(ax, *lines, status)
     ax.set_aspect("equal")
-    label(ax.xaxis, grid.names[0], "m", plain=True)
-    label(ax.yaxis, grid.names[1], "m", plain=True)
+    style.label(ax.xaxis, grid.names[0], "m", plain=True)
+    style.label(ax.yaxis, grid.names[1], "m", plain=True)
     if marked:
         _add_legend(ax, [status_patch(kind) for kind in marked], one_column=False)
 
@@ -389,13 +383,13 @@ def hatch_cells(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> li
     for kind in marked:
         here = np.ma.masked_where(status != kind, np.ones(status.shape))
         blank = ListedColormap(["white"])
-        ax.pcolor(x, y, here, cmap=blank, hatch=HATCH_OF[kind], edgecolor=GREY, linewidth=0.0, zorder=1.5)
+        ax.pcolor(x, y, here, cmap=blank, hatch=HATCH_OF[kind], edgecolor=style.GREY, linewidth=0.0, zorder=1.5)
     return marked
 
 
 def status_patch(status: int) -> Patch:
     """A legend's entry for cells of this status."""
-    look: dict[str, Any] = {"facecolor": "white", "edgecolor": GREY, "linewidth": 0.5}
+    look: dict[str, Any] = {"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.5}
     return Patch(hatch=HATCH_OF[status], label=STATUS[status], **look)
 
 
@@ -407,7 +401,11 @@ def _draw_bands(ax: Axes, table: SafeWalls) -> None:
     bands = [table.stiffness_of_level(0, 0, level) for level in range(table.levels + 1)]
     low, high = table.ranges[0, 0].T
     has_walls = low <= high  # else the band has no safe damping
-    steps: dict[str, Any] = {"baseline": np.where(has_walls, low, np.nan), "facecolor": STABLE, "edgecolor": BLACK}
+    steps: dict[str, Any] = {
+        "baseline": np.where(has_walls, low, np.nan),
+        "facecolor": style.STABLE,
+        "edgecolor": style.BLACK,
+    }
     text = "safe walls, by band of stiffness"
     ax.stairs(np.where(has_walls, high, np.nan), bands, fill=True, linewidth=0.8, label=text, **steps)
     rectangle = table.rectangle(0)
@@ -415,10 +413,10 @@ def _draw_bands(ax: Axes, table: SafeWalls) -> None:
     text = f"K up to {quantity(rectangle.stiffness, 'N/m')}, B from {low_text} to {high_text}"
     size = rectangle.stiffness, rectangle.high - rectangle.low
     ax.add_patch(
-        Rectangle((0.0, rectangle.low), *size, fill=False, edgecolor=VERMILION, linewidth=1.6, label=text)
+        Rectangle((0.0, rectangle.low), *size, fill=False, edgecolor=style.VERMILION, linewidth=1.6, label=text)
     )
     ax.set_xlim(0.0, 1.05 * bands[-1])
     ax.set_ylim(bottom=0.0)
-    label(ax.xaxis, "Virtual stiffness K", "N/m")
-    label(ax.yaxis, "Virtual damping B", "N s/m")
-    legend_above(ax)
+    style.label(ax.xaxis, "Virtual stiffness K", "N/m")
+    style.label(ax.yaxis, "Virtual damping B", "N s/m")
+    style.legend_above(ax)

@@ -28,19 +28,8 @@ from zwidth.errors import PostureError
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture, link_points, solve_posture
+from zwidth.show.figures import style
 from zwidth.show.figures.contact_response import LONGEST_LINE, WORTH, draw_envelope, draw_line
-from zwidth.show.figures.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    LINES,
-    VERMILION,
-    context,
-    figure,
-    label,
-    legend_above,
-    legend_beside,
-)
 from zwidth.show.mechanism_scene import (
     SAME_POINT,
     MassChain,
@@ -61,13 +50,15 @@ LEAST: Final = 1e-3  # share of the mechanism's size that a close-up shows at le
 ROOM: Final = 0.12  # of the half size of a view, on each side of it
 TITLE: Final = 60  # letters of a line
 VISIBLE: Final = 2e-3  # share of the path's size by which readings are off that are drawn
-LINK_COLOURS: Final = tuple(colour for colour, _ in LINES if colour != VERMILION)  # which is the path's
+LINK_COLOURS: Final = tuple(
+    colour for colour, _ in style.LINES if colour != style.VERMILION
+)  # which is the path's
 
 
 def mechanism_motion_figure() -> tuple[Figure, list[Axes]]:
     """A figure with the five panels of `draw_mechanism_motion`: two drawings, and three courses beside them."""
-    drawing, first = figure(9.6, 7.6)
-    with context():
+    drawing, first = style.figure(9.6, 7.6)
+    with style.context():
         grid = drawing.add_gridspec(6, 2, width_ratios=(1.0, 1.1))
         first.set_subplotspec(grid[:3, 0])
         close = drawing.add_subplot(grid[3:, 0])
@@ -88,10 +79,10 @@ def draw_mechanism_motion(axes: Sequence[Axes], motion: MechanismMotion) -> None
     _draw_contact(depth, force, motion, draw)
     _draw_energies(energy, motion, draw)
     for ax in (depth, force, energy) if motion.surface is not None else (energy,):
-        legend_above(ax, columns=4)
+        style.legend_above(ax, columns=4)
         ax.margins(x=0.0, y=0.08)
         ax.tick_params(labelbottom=ax is energy)
-    label(energy.xaxis, "Time", "s")
+    style.label(energy.xaxis, "Time", "s")
     depth.figure.align_ylabels([depth, force, energy])
 
 
@@ -104,7 +95,7 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
     flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes[0], motion.position]))
     for faint, pose, lines in zip((False, True), poses, strokes, strict=False):
         _draw_posture(ax, mechanism, pose, lines, flat, faint)
-    ax.plot(*motion.position[:, flat].T, color=VERMILION, linewidth=1.3, zorder=4.0, label="path")
+    ax.plot(*motion.position[:, flat].T, color=style.VERMILION, linewidth=1.3, zorder=4.0, label="path")
     points = np.vstack([np.zeros((1, 3)), *(stroke for lines in strokes for stroke in lines), motion.position])
     projection = points[:, flat]
     size = max(float(np.max(np.ptp(projection, axis=0))), 1e-9)
@@ -112,7 +103,7 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
     view = _view_around(projection if corners is None else np.vstack([projection, corners[:, flat]]), size * LEAST)
     _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
-    legend_above(ax, columns=4)
+    style.legend_above(ax, columns=4)
 
 
 def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
@@ -121,7 +112,7 @@ def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
     # the two coordinates that are shown
     flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))
     size = float(np.max(np.ptp(np.vstack(strokes), axis=0)))
-    mark: dict[str, Any] = {"linestyle": "none", "markersize": 7.0, "markeredgecolor": BLACK, "zorder": 5.0}
+    mark: dict[str, Any] = {"linestyle": "none", "markersize": 7.0, "markeredgecolor": style.BLACK, "zorder": 5.0}
     if not len(motion.time):
         place = motion.start.position[None, flat]
         ax.plot(*place.T, marker="o", markerfacecolor="white", label="start", **mark)
@@ -130,14 +121,14 @@ def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
         return
     true, readings = motion.position[:, flat], motion.counted_position[:, flat]
     if np.max(np.abs(true - readings)) > VISIBLE * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
-        ax.plot(*readings.T, color=BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
-    ax.plot(*true.T, color=VERMILION, linewidth=1.3, label="path", zorder=4.0)
+        ax.plot(*readings.T, color=style.BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
+    ax.plot(*true.T, color=style.VERMILION, linewidth=1.3, label="path", zorder=4.0)
     ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
-    ax.plot(*true[-1][:, None], marker="s", markerfacecolor=BLACK, label="end", **mark)
+    ax.plot(*true[-1][:, None], marker="s", markerfacecolor=style.BLACK, label="end", **mark)
     view = _view_around(true, size * LEAST)
     _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
-    legend_above(ax, columns=5)
+    style.legend_above(ax, columns=5)
 
 
 def _last_posture(motion: MechanismMotion) -> Posture | None:
@@ -172,10 +163,15 @@ def _draw_posture(
         colour = LINK_COLOURS[n % len(LINK_COLOURS)]
         width = 3.0 if faint else 5.0
         ax.plot(*stroke[:, flat].T, color=colour, linewidth=width, alpha=0.35 * strength, zorder=2.0 - faint)
-        style: dict[str, Any] = {"color": colour, "linewidth": 1.2, "alpha": strength, "zorder": 2.1 - faint}
-        ax.plot(*stroke[:, flat].T, label=named if n == 0 else "", **style)
+        line_style: dict[str, Any] = {"color": colour, "linewidth": 1.2, "alpha": strength, "zorder": 2.1 - faint}
+        ax.plot(*stroke[:, flat].T, label=named if n == 0 else "", **line_style)
     joints = joint_points(mechanism, link_points(mechanism, posture))[:, flat]
-    circle: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none", "markeredgecolor": BLACK}
+    circle: dict[str, Any] = {
+        "marker": "o",
+        "markersize": 5.0,
+        "linestyle": "none",
+        "markeredgecolor": style.BLACK,
+    }
     ax.plot(*joints.T, markerfacecolor="white", alpha=strength, zorder=3.0 - faint, **circle)
 
 
@@ -226,7 +222,7 @@ def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
     ax.set_axisbelow(True)
     ax.xaxis.set_major_locator(MaxNLocator(4, steps=(1, 2, 5, 10)))  # long labels of a close view keep apart
     for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
-        label(axis, AXES[k], "m", plain=True)
+        style.label(axis, AXES[k], "m", plain=True)
 
 
 def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMotion) -> None:
@@ -245,8 +241,8 @@ def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMoti
         name = "wall"
         ax.contourf(x, y, depth, levels=[0.0, np.inf], colors=[WALL], zorder=0.5)
     if depth.min() < 0.0 < depth.max():
-        ax.contour(x, y, depth, levels=[0.0], colors=[GREY], linewidths=1.2, zorder=0.7)
-    ax.plot([], [], color=GREY, linewidth=1.2, label=name + _cut_text(motion, cut))
+        ax.contour(x, y, depth, levels=[0.0], colors=[style.GREY], linewidths=1.2, zorder=0.7)
+    ax.plot([], [], color=style.GREY, linewidth=1.2, label=name + _cut_text(motion, cut))
 
 
 def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) -> None:
@@ -254,15 +250,15 @@ def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) 
 
     draw  `draw_line` or `draw_envelope`
     """
-    label(depth.yaxis, "Depth", "m")
-    label(force.yaxis, "Force", "N")
+    style.label(depth.yaxis, "Depth", "m")
+    style.label(force.yaxis, "Force", "N")
     if motion.surface is None:
         for ax in (depth, force):
             ax.set_visible(False)
         return
-    draw(depth, motion.time, motion.depth, BLUE, "depth")
-    depth.axhline(0.0, color=GREY, linewidth=0.7, linestyle=":", zorder=1.5, label="surface")
-    draw(force, motion.time, motion.force_size, BLUE, "force on the handle, as commanded", held=True)
+    draw(depth, motion.time, motion.depth, style.BLUE, "depth")
+    depth.axhline(0.0, color=style.GREY, linewidth=0.7, linestyle=":", zorder=1.5, label="surface")
+    draw(force, motion.time, motion.force_size, style.BLUE, "force on the handle, as commanded", held=True)
 
 
 def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
@@ -280,11 +276,11 @@ def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
     }
     sizes = {name: float(np.max(np.abs(values))) for name, values in courses.items()}
     largest = max(size for size in sizes.values() if size == size)  # not nan
-    for (name, values), (colour, dashes) in zip(courses.items(), LINES, strict=True):
+    for (name, values), (colour, dashes) in zip(courses.items(), style.LINES, strict=True):
         if sizes[name] > WORTH * largest:
             draw(ax, motion.time, values, colour, name, dashes=dashes)
-    ax.axhline(0.0, color=GREY, linewidth=0.7, linestyle=":", zorder=1.5)
-    label(ax.yaxis, "Energy", "J")
+    ax.axhline(0.0, color=style.GREY, linewidth=0.7, linestyle=":", zorder=1.5)
+    style.label(ax.yaxis, "Energy", "J")
 
 
 AXES = "xyz"
@@ -314,8 +310,8 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
     view = np.eye(3)[flat] if planar else OBLIQUE
     size = max(float(np.max(np.ptp(everything @ view.T, axis=0))), 1e-9)
-    for stroke, name, style, first in zip(strokes, scene.names, scene.styles, scene.first, strict=True):
-        _draw_link(ax, stroke @ view.T, name if first else "", style)
+    for stroke, name, number, first in zip(strokes, scene.names, scene.styles, scene.first, strict=True):
+        _draw_link(ax, stroke @ view.T, name if first else "", number)
     _draw_joints(ax, scene, view, size, [stroke @ view.T for stroke in strokes])
     _draw_handle(ax, view @ posture.position, np.asarray(direction, dtype=float), view, size)
     ax.set_aspect("equal")
@@ -325,10 +321,10 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     if planar:
         ax.grid(color="#E4E4E4", linewidth=0.5)
         for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
-            label(axis, AXES[k], "m", plain=True)
+            style.label(axis, AXES[k], "m", plain=True)
     else:
         _draw_base_axes(ax, everything @ view.T, size)
-    legend_beside(ax)
+    style.legend_beside(ax)
 
 
 def _draw_base_axes(ax: Axes, points: Floats, size: float) -> None:
@@ -341,8 +337,10 @@ def _draw_base_axes(ax: Axes, points: Floats, size: float) -> None:
     corner = points.min(axis=0) - np.array([0.2, 0.12]) * size
     for k, name in enumerate(AXES):
         tip = corner + length * OBLIQUE[:, k]
-        ax.plot(*np.array([corner, tip]).T, color=GREY, linewidth=1.2, solid_capstyle="round")
-        ax.annotate(name, (float(tip[0]), float(tip[1])), ha="center", va="bottom", fontsize=8.0, color=BLACK)
+        ax.plot(*np.array([corner, tip]).T, color=style.GREY, linewidth=1.2, solid_capstyle="round")
+        ax.annotate(
+            name, (float(tip[0]), float(tip[1])), ha="center", va="bottom", fontsize=8.0, color=style.BLACK
+        )
     ax.annotate(
         f"axes: {quantity(length, 'm')} each",
         (float(corner[0]), float(corner[1])),
@@ -350,19 +348,26 @@ def _draw_base_axes(ax: Axes, points: Floats, size: float) -> None:
         textcoords="offset points",
         va="top",
         fontsize=8.0,
-        color=BLACK,
+        color=style.BLACK,
     )
     # an empty line widens the view by the room of the text
     ax.plot(*(corner - np.array([0.0, 0.12 * size]))[:, None], linestyle="none", marker=None)
     ax.axis("off")
 
 
-def _draw_link(ax: Axes, stroke: Floats, name: str, style: int) -> None:
+def _draw_link(ax: Axes, stroke: Floats, name: str, number: int) -> None:
     """Draw one link, a stroke (k, 2) in the picture, in the line style of this number; named in the legend."""
-    colour = LINES[style % len(LINES)][0]
+    colour = style.LINES[number % len(style.LINES)][0]
     look: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 2.0}
     ax.plot(*stroke.T, color=colour, linewidth=5.0, alpha=0.35, **look)
-    ax.plot(*stroke.T, color=colour, linestyle=LINES[style % len(LINES)][1], linewidth=1.2, label=name, zorder=2.1)
+    ax.plot(
+        *stroke.T,
+        color=colour,
+        linestyle=style.LINES[number % len(style.LINES)][1],
+        linewidth=1.2,
+        label=name,
+        zorder=2.1,
+    )
 
 
 def _draw_joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes: list[Floats]) -> None:
@@ -374,7 +379,12 @@ def _draw_joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, str
     base = scene.base @ view.T
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
-    circle: dict[str, Any] = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
+    circle: dict[str, Any] = {
+        "marker": "o",
+        "markersize": 7.0,
+        "linestyle": "none",
+        "markeredgecolor": style.BLACK,
+    }
     ax.plot(
         *(scene.joints @ view.T).T,
         markerfacecolor="white",
@@ -384,7 +394,7 @@ def _draw_joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, str
     )
     driven = scene.driven @ view.T
     if len(driven):
-        ax.plot(*driven.T, markerfacecolor=BLUE, zorder=3.1, label="driven joint", **circle)
+        ax.plot(*driven.T, markerfacecolor=style.BLUE, zorder=3.1, label="driven joint", **circle)
     for place, names in _labels_by_position(driven, scene.drives, SAME_POINT * max(size, 1.0)):
         aside = _free_side(place, strokes, SAME_POINT * max(size, 1.0))
         room = place + 0.2 * size * aside  # texts do not widen the view
@@ -397,7 +407,7 @@ def _draw_joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, str
             ha="left" if aside[0] > 0.3 else "right" if aside[0] < -0.3 else "center",
             va="bottom" if aside[1] > 0.3 else "top" if aside[1] < -0.3 else "center",
             fontsize=8.0,
-            color=BLACK,
+            color=style.BLACK,
             path_effects=[withStroke(linewidth=3.0, foreground="white")],
             zorder=5.0,
         )
@@ -453,14 +463,14 @@ def _draw_handle(ax: Axes, handle: Floats, direction: Floats, view: Floats, size
         *handle[:, None],
         marker="D",
         markersize=8.0,
-        color=VERMILION,
+        color=style.VERMILION,
         markeredgecolor="white",
         linestyle="none",
         zorder=4.0,
         label=f"handle and\n{'axis of moments' if turns else 'rendered direction'}",
     )
     if not np.linalg.norm(along) > SAME_POINT * np.linalg.norm(direction):
-        ax.plot(*handle[:, None], marker="o", markersize=15.0, fillstyle="none", color=VERMILION)
+        ax.plot(*handle[:, None], marker="o", markersize=15.0, fillstyle="none", color=style.VERMILION)
         return
     tip = handle + 0.28 * size * along / np.linalg.norm(along)
     arrow = FancyArrowPatch(
@@ -468,13 +478,13 @@ def _draw_handle(ax: Axes, handle: Floats, direction: Floats, view: Floats, size
         tuple(tip),
         arrowstyle="-|>",
         mutation_scale=14.0,
-        color=VERMILION,
+        color=style.VERMILION,
         linewidth=1.8,
         zorder=4.1,
     )
     ax.add_patch(arrow)
     # patches of display size do not widen the view
-    ax.plot(*tip[:, None], linestyle="none", marker=None, color=GREY)
+    ax.plot(*tip[:, None], linestyle="none", marker=None, color=style.GREY)
 
 
 WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height of a mass
@@ -485,7 +495,7 @@ def draw_chain(ax: Axes, plant: Plant, chain: MassChain) -> None:
     count = len(chain.mass)
     left = GAP * (np.arange(count) + 1.0) + WIDTH * np.arange(count)
     for k, x in enumerate(left):
-        ax.add_patch(Rectangle((x, -HALF), WIDTH, 2 * HALF, facecolor="#EEEEEE", edgecolor=BLACK))
+        ax.add_patch(Rectangle((x, -HALF), WIDTH, 2 * HALF, facecolor="#EEEEEE", edgecolor=style.BLACK))
         ax.text(x + WIDTH / 2, 0.0, as_written(float(chain.mass[k]), "kg"), ha="center", va="center", fontsize=8.0)
         ax.text(x + WIDTH / 2, -HALF - 0.12, "\n".join(_roles(plant, k)), ha="center", va="top", fontsize=8.0)
     for k in range(count + 1):
@@ -515,20 +525,20 @@ def _draw_spring_and_damper(ax: Axes, start: float, end: float, stiffness: float
         y = 0.3 if both else 0.0
         x = start + (end - start) * np.array([0.0, 0.2, *np.linspace(0.235, 0.765, 9), 0.8, 1.0])
         zigzag = [0.0, 0.0, *(0.13 * (-1.0) ** k for k in range(9)), 0.0, 0.0]
-        ax.plot(x, y + np.array(zigzag), color=VERMILION, linewidth=1.2)
+        ax.plot(x, y + np.array(zigzag), color=style.VERMILION, linewidth=1.2)
         ax.text((start + end) / 2, y + 0.18, as_written(stiffness, "N/m"), ha="center", va="bottom", fontsize=8.0)
     if damping > 0.0:
         y = -0.3 if both else 0.0
         middle = (start + end) / 2
-        ax.plot([start, middle], [y, y], color=GREY, linewidth=1.2)
-        ax.plot([middle] * 2, [y - 0.13, y + 0.13], color=GREY, linewidth=1.2)
+        ax.plot([start, middle], [y, y], color=style.GREY, linewidth=1.2)
+        ax.plot([middle] * 2, [y - 0.13, y + 0.13], color=style.GREY, linewidth=1.2)
         sides = [middle - 0.22, middle + 0.22, middle + 0.22, middle - 0.22]
         cup = [y + 0.18, y + 0.18, y - 0.18, y - 0.18]
-        ax.plot(sides, cup, color=GREY, linewidth=1.2)
-        ax.plot([middle + 0.22, end], [y, y], color=GREY, linewidth=1.2)
+        ax.plot(sides, cup, color=style.GREY, linewidth=1.2)
+        ax.plot([middle + 0.22, end], [y, y], color=style.GREY, linewidth=1.2)
         ax.text(middle, y - 0.27, as_written(damping, "N s/m"), ha="center", va="top", fontsize=8.0)
 
 
 def _draw_ground(ax: Axes, x: float) -> None:
     """Draw the ground, an upright line."""
-    ax.plot([x, x], [-HALF, HALF], color=BLACK, linewidth=2.0)
+    ax.plot([x, x], [-HALF, HALF], color=style.BLACK, linewidth=2.0)

@@ -13,20 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from zwidth.show.figures.style import (
-    AXIS_SIZE,
-    BLACK,
-    BLUE,
-    GREY,
-    LINES,
-    TICK_SIZE,
-    VERMILION,
-    figure_width,
-    legend_above,
-    number_logarithmic,
-    text_width,
-    wrapped,
-)
+from zwidth.show.figures import style
 from zwidth.show.units import MINUS, NONE, quantity, signed
 from zwidth.study.model_validity import Validity
 from zwidth.study.sensitivity.goal import Goal
@@ -70,10 +57,10 @@ def _draw_bars(ax: Axes, shown: list[tuple[str, float]], axis_name: str) -> None
     widest = max((abs(value) for value in values), default=1.0)
     for row, value in zip(rows, values, strict=True):
         _draw_bar(ax, row, value)
-    ax.axvline(0.0, color=BLACK, linewidth=0.8)
+    ax.axvline(0.0, color=style.BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
-    labels = [_on_two_lines_if_wide(_short_path(path), 0.45 * figure_width(ax)) for path, _ in shown]
-    beside = figure_width(ax) - _widest_line(labels) - MARGINS
+    labels = [_on_two_lines_if_wide(_short_path(path), 0.45 * style.figure_width(ax)) for path, _ in shown]
+    beside = style.figure_width(ax) - _widest_line(labels) - MARGINS
     # numbers stand outside of the bars: both sides have room for the longest, whatever the bars span
     sides = (low < 0.0) + (high > 0.0)
     share = max(NUMBER_ROOM, NUMBER_WIDTH / max(beside - sides * NUMBER_WIDTH, NUMBER_WIDTH))
@@ -85,10 +72,10 @@ def _draw_bars(ax: Axes, shown: list[tuple[str, float]], axis_name: str) -> None
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
     ax.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    ax.set_xlabel("\n".join(wrapped(axis_name, beside, AXIS_SIZE)))
+    ax.set_xlabel("\n".join(style.wrapped(axis_name, beside, style.AXIS_SIZE)))
     if not shown:
         ax.set_yticks([])
-        ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)
+        ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=style.GREY)
 
 
 def _draw_bar(ax: Axes, row: int, value: float) -> None:
@@ -98,8 +85,8 @@ def _draw_bar(ax: Axes, row: int, value: float) -> None:
         row,
         value,
         height=0.62,
-        color=BLUE if value > 0.0 else "white",
-        edgecolor=BLUE if value > 0.0 else VERMILION,
+        color=style.BLUE if value > 0.0 else "white",
+        edgecolor=style.BLUE if value > 0.0 else style.VERMILION,
         hatch=None if value > 0.0 else "//////",
         linewidth=0.8,
     )
@@ -118,13 +105,15 @@ def _draw_bar(ax: Axes, row: int, value: float) -> None:
 
 def _widest_line(labels: list[str]) -> float:
     """Width of the widest line of labels, which may have several lines [points]."""
-    return max((text_width(line, TICK_SIZE) for label in labels for line in label.split("\n")), default=0.0)
+    return max(
+        (style.text_width(line, style.TICK_SIZE) for label in labels for line in label.split("\n")), default=0.0
+    )
 
 
 def _on_two_lines_if_wide(path: str, width: float) -> str:
     """The path on one line, or with its last name on a second where it is wider than `width` [points]."""
     table, dot, name = path.rpartition(".")
-    return path if text_width(path, TICK_SIZE) <= width or not dot else f"{table}.\n{name}"
+    return path if style.text_width(path, style.TICK_SIZE) <= width or not dot else f"{table}.\n{name}"
 
 
 def _short_path(path: str) -> str:
@@ -139,7 +128,7 @@ def draw_validity(ax: Axes, validity: Validity) -> None:
     """
     # the first colour is the device as described, elsewhere in a report
     for fit, (colour, dashes) in zip(
-        (fit for fit in validity.fits if len(fit.error)), LINES[1:] + LINES[:1], strict=False
+        (fit for fit in validity.fits if len(fit.error)), style.LINES[1:] + style.LINES[:1], strict=False
     ):
         frequency, error = _with_gaps(fit.frequency, 100.0 * np.clip(fit.error, 1e-4, 10.0), validity.arc)
         ax.plot(frequency, error, color=colour, linestyle=dashes, label=fit.label)
@@ -149,17 +138,17 @@ def draw_validity(ax: Axes, validity: Validity) -> None:
     ax.axhspan(0.01, percent, color="#EFEFEF", zorder=0.5, label=f"within {percent:g} %")
     if isfinite(validity.first_natural):
         text = f"first natural frequency: {quantity(validity.first_natural, 'Hz')}"
-        ax.axvline(validity.first_natural, color=GREY, linestyle=(0, (6, 3)), linewidth=0.8, label=text)
+        ax.axvline(validity.first_natural, color=style.GREY, linestyle=(0, (6, 3)), linewidth=0.8, label=text)
     if len(validity.frequency):
         ax.set_xlim(
             validity.frequency[0], max(validity.frequency[-1], 1.05 * np.nan_to_num(validity.first_natural))
         )
     ax.set_ylim(0.01, 1000.0)
-    number_logarithmic(ax.xaxis, *ax.get_xlim())
-    number_logarithmic(ax.yaxis, *ax.get_ylim())
+    style.number_logarithmic(ax.xaxis, *ax.get_xlim())
+    style.number_logarithmic(ax.yaxis, *ax.get_ylim())
     ax.set_xlabel("Frequency at which the wall fails [Hz]")
     ax.set_ylabel("Error of the model [%]")
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 def _with_gaps(x: np.ndarray, y: np.ndarray, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -36,18 +36,7 @@ from zwidth.loop.loop import Loop
 from zwidth.measures.root_paths import EigenvaluePaths
 from zwidth.model.modes import natural_frequencies
 from zwidth.show.circumstances import value_text
-from zwidth.show.figures.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    LINES,
-    ORANGE,
-    STABLE,
-    VERMILION,
-    draw_empty,
-    label,
-    legend_above,
-)
+from zwidth.show.figures import style
 from zwidth.show.units import quantity
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
@@ -62,13 +51,13 @@ def draw_chart(ax: Axes, chart: StabilityChart, window: Window | None = None) ->
     in_doubt = bool(getattr(chart, "doubt", ""))
     for n, ring in enumerate(chart.regions):
         text = "stable walls found; there may be others" if in_doubt else "stable walls"
-        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else text))
+        ax.add_patch(Polygon(ring, facecolor=style.STABLE, edgecolor="none", label="" if n else text))
     for arc in chart.boundary:
-        ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
+        ax.plot(arc.stiffness, arc.damping, color=style.BLACK, solid_capstyle="round")
     if not isnan(chart.stiffness_max):
         mark_stiffest(ax, chart, _stiffest_text(chart))
     frame(ax, window or chart.box, empty=not chart.regions)
-    legend_above(ax)
+    style.legend_above(ax)
 
 
 def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window | None = None) -> None:
@@ -80,15 +69,15 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
     first = next(iter(charts.values()))
     shown = next((chart for chart in charts.values() if chart.regions), first)
     for ring in first.regions:
-        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none"))
+        ax.add_patch(Polygon(ring, facecolor=style.STABLE, edgecolor="none"))
     # the first on top: where models agree it is the one to be seen
     for n, (name, chart) in enumerate(charts.items()):
-        colour, dashes = LINES[n % len(LINES)]
+        colour, dashes = style.LINES[n % len(style.LINES)]
         text = name if chart.regions else f"{name}: nothing stable"
         for k, ring in enumerate(edges_of(chart.regions) or (np.full((1, 2), np.nan),)):
             ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, zorder=4.0 - 0.1 * n)
     frame(ax, window or shown.box, empty=not shown.regions)
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 def edges_of(rings: Sequence[Floats]) -> list[Floats]:
@@ -128,7 +117,7 @@ def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart, text: str) ->
         marker="o",
         markersize=6.0,
         markerfacecolor="white",
-        markeredgecolor=VERMILION,
+        markeredgecolor=style.VERMILION,
         markeredgewidth=1.6,
         linestyle="none",
         zorder=5.0,
@@ -146,11 +135,11 @@ def frame(ax: Axes, window: Window, *, empty: bool) -> None:
     ax.set_ylim(B0, B1)
     for draw, low, high in ((ax.axvline, K0, K1), (ax.axhline, B0, B1)):
         if low < 0.0 < high:
-            draw(0.0, color=GREY, linewidth=0.6, zorder=1.5)
-    label(ax.xaxis, "Virtual stiffness K", "N/m")
-    label(ax.yaxis, "Virtual damping B", "N s/m")
+            draw(0.0, color=style.GREY, linewidth=0.6, zorder=1.5)
+    style.label(ax.xaxis, "Virtual stiffness K", "N/m")
+    style.label(ax.yaxis, "Virtual damping B", "N s/m")
     if empty:
-        draw_empty(ax)
+        style.draw_empty(ax)
 
 
 def draw_decay_contours(
@@ -176,11 +165,11 @@ def draw_decay_contours(
             continue
         draw_level(ax, level, _radius_text(radius, loop.period), n + 1, len(levels) + 1)
     buildable = chart.fastest_decay_in_first_quadrant
-    _draw_star(ax, buildable, f"fastest{' with K, B ≥ 0' * (best != buildable)}", loop.period, VERMILION)
+    _draw_star(ax, buildable, f"fastest{' with K, B ≥ 0' * (best != buildable)}", loop.period, style.VERMILION)
     if best != buildable:
         _draw_star(ax, best, "fastest of all", loop.period, "white")
     frame(ax, window or chart.box, empty=not chart.regions)
-    legend_above(ax, columns=2, title="Slowest motion: factor per sample (time until a tenth is left)")
+    style.legend_above(ax, columns=2, title="Slowest motion: factor per sample (time until a tenth is left)")
 
 
 def _draw_star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour: str) -> None:
@@ -190,15 +179,17 @@ def _draw_star(ax: Axes, wall: FastestDecay | None, name: str, period: float, co
     """
     if wall:
         title = f"{name}: {_radius_text(wall.spectral_radius, period)}"
-        (star,) = ax.plot([wall.stiffness], [wall.damping], "*", color=VERMILION, markersize=11.0, label=title)
+        (star,) = ax.plot(
+            [wall.stiffness], [wall.damping], "*", color=style.VERMILION, markersize=11.0, label=title
+        )
         star.set(markerfacecolor=colour, zorder=5.0)
 
 
 def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int) -> None:
     """Draw one contour of decay; black for rank 0, lighter with the rank of `count` contours."""
-    colour = colormaps["viridis"](0.75 * rank / max(count - 1, 1)) if rank else BLACK
+    colour = colormaps["viridis"](0.75 * rank / max(count - 1, 1)) if rank else style.BLACK
     for k, ring in enumerate(edges_of(chart.regions)):
-        dashes = LINES[rank % len(LINES)][1]
+        dashes = style.LINES[rank % len(style.LINES)][1]
         ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, linewidth=1.2)
 
 
@@ -242,17 +233,17 @@ def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
     for n, arc in enumerate(chart.boundary):
         inside = (arc.stiffness >= -SAME_WALL * width) & (arc.damping >= 0.0)
         K, f = np.where(inside, arc.stiffness, np.nan), np.where(inside, arc.frequency, np.nan)
-        ax.plot(K, f, color=BLUE, label="" if n else "along the edge of stability")
+        ax.plot(K, f, color=style.BLUE, label="" if n else "along the edge of stability")
     for n, (K_corner, _, low, high) in enumerate(corners(chart)):
         text = f"corner: {quantity(low, 'Hz')} and {quantity(high, 'Hz')}"
-        ax.plot([K_corner, K_corner], [low, high], color=VERMILION, linewidth=0.8, linestyle=":")
+        ax.plot([K_corner, K_corner], [low, high], color=style.VERMILION, linewidth=0.8, linestyle=":")
         ax.plot(
             [K_corner, K_corner],
             [low, high],
             marker="o",
             markersize=6.0,
             markerfacecolor="white",
-            markeredgecolor=VERMILION,
+            markeredgecolor=style.VERMILION,
             markeredgewidth=1.4,
             linestyle="none",
             zorder=4.0,
@@ -261,9 +252,9 @@ def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
     _draw_natural_frequencies(ax, chart)
     ax.set_xlim(left=0.0)
     ax.set_ylim(bottom=0.0)
-    label(ax.xaxis, "Virtual stiffness K", "N/m")
-    label(ax.yaxis, "Frequency of the vibration", "Hz")
-    legend_above(ax)
+    style.label(ax.xaxis, "Virtual stiffness K", "N/m")
+    style.label(ax.yaxis, "Frequency of the vibration", "Hz")
+    style.legend_above(ax)
 
 
 def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
@@ -299,10 +290,10 @@ def _draw_natural_frequencies(ax: Axes, chart: StabilityChart) -> None:
     for n, f in enumerate(shown):
         numbers = ", ".join(quantity(x, "Hz") for x in shown)
         text = f"natural frequenc{'ies' if len(shown) > 1 else 'y'}: {numbers}"
-        ax.axhline(f, color=GREY, linestyle=(0, (6, 3)), linewidth=0.8, label="" if n else text)
+        ax.axhline(f, color=style.GREY, linestyle=(0, (6, 3)), linewidth=0.8, label="" if n else text)
 
 
-NAMED: Final = len(LINES) - 1  # binding members with a line of their own; the last line is for the rest
+NAMED: Final = len(style.LINES) - 1  # binding members with a line of their own; the last line is for the rest
 DRAWN_MEMBERS: Final = 200  # whose sets are shaded at most
 DRAWN_EDGES: Final = 9  # of members, at most: more lie too close to be told apart
 SHADE: Final = "#EFEFEF"  # of walls that some members allow
@@ -324,14 +315,14 @@ def draw_robust(
     view = window or _default_window(chart)
     for n, ring in enumerate(chart.regions):
         text = "" if n else _filled_set_text(chart)
-        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=text, zorder=1.1))
+        ax.add_patch(Polygon(ring, facecolor=style.STABLE, edgecolor="none", label=text, zorder=1.1))
     _draw_members(ax, chart)
     for n, outline in enumerate(chart.outlines[chart.best_by_area]):
         text = "" if n else f"best member by area: {_member_words(members, chart.best_by_area)}"
-        ax.plot(*outline.T, color=GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
+        ax.plot(*outline.T, color=style.GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
     _draw_edge(ax, chart, members, view)
     frame(ax, view, empty=not chart.regions)
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 def _draw_members(ax: Axes, chart: CommonChart) -> None:
@@ -381,7 +372,7 @@ def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]
     drawn = {"limited by others"} if others <= least_length else set[str]()
     for arc in chart.boundary:
         place = named.index(arc.member) if arc.member in named else NAMED
-        colour, dashes = LINES[place]
+        colour, dashes = style.LINES[place]
         text = f"limited by {_member_words(members, arc.member)}" if place < NAMED else "limited by others"
         ax.plot(
             arc.stiffness,
@@ -438,11 +429,13 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
     window  what to show; left out: the regions' box and 5 %
     """
     for n, ring in enumerate(chart.regions):
-        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable as measured"))
+        ax.add_patch(
+            Polygon(ring, facecolor=style.STABLE, edgecolor="none", label="" if n else "stable as measured")
+        )
     if chart.band is not None:
         _fill_band(ax, chart.band)
     for ring in edges_of(chart.regions):
-        ax.plot(*ring.T, color=BLACK, linewidth=0.9)
+        ax.plot(*ring.T, color=style.BLACK, linewidth=0.9)
     _draw_measured_points(ax, chart)
     _draw_unusable(ax, chart)
     if chart.stiffness_max == chart.stiffness_max:  # not nan
@@ -451,14 +444,14 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
         ax.plot(
             [chart.stiffness_max_nominal],
             [chart.damping_at_stiffness_max_nominal],
-            color=BLACK,
+            color=style.BLACK,
             marker="x",
             linestyle="none",
             zorder=4.9,
             label=f"as measured: {quantity(chart.stiffness_max_nominal, 'N/m')}",
         )
     frame(ax, window or chart.box, empty=not chart.regions)
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
 
 
 def _fill_band(ax: Axes, band: DoubtBand) -> None:
@@ -467,7 +460,7 @@ def _fill_band(ax: Axes, band: DoubtBand) -> None:
         ax.add_patch(
             Polygon(
                 ring,
-                facecolor=ORANGE,
+                facecolor=style.ORANGE,
                 edgecolor="none",
                 alpha=0.45,
                 zorder=1.8,
@@ -483,7 +476,7 @@ def _draw_measured_points(ax: Axes, chart: MeasuredChart) -> None:
             ax.plot(
                 arc.stiffness,
                 arc.damping,
-                color=BLUE,
+                color=style.BLUE,
                 marker=".",
                 markersize=3.0,
                 linestyle="none",
@@ -505,7 +498,7 @@ def _draw_unusable(ax: Axes, chart: MeasuredChart) -> None:
         ax.plot(
             K,
             B,
-            color=VERMILION,
+            color=style.VERMILION,
             linestyle=((0, (1.2, 1.2)), (0, (4, 1.5)), (0, (6, 1.5, 1.2, 1.5)))[n % LONGEST_LIST],
             linewidth=2.2,
             label=text if n <= LONGEST_LIST else "",
@@ -521,22 +514,30 @@ def draw_eigenvalue_paths(ax: Axes, paths: EigenvaluePaths) -> None:
 
     It begins at a circle, at the first value of what is varied, and ends at a square, at the last.
     """
-    ax.plot(CIRCLE.real, CIRCLE.imag, color=GREY, linewidth=0.8, label="unit circle", zorder=1.0)
+    ax.plot(CIRCLE.real, CIRCLE.imag, color=style.GREY, linewidth=0.8, label="unit circle", zorder=1.0)
     for n, z in enumerate(paths.eigenvalues.T):
-        colour, dashes = LINES[n % len(LINES)]
+        colour, dashes = style.LINES[n % len(style.LINES)]
         ax.plot(z.real, z.imag, color=colour, linestyle=dashes, zorder=2.0)
     for row, marker, value in ((0, "o", paths.values[0]), (-1, "s", paths.values[-1])):
         z = paths.eigenvalues[row]
         ax.plot(
-            z.real, z.imag, marker, color=BLACK, markerfacecolor="white", markersize=4.5, label=f"at {value:g}"
+            z.real,
+            z.imag,
+            marker,
+            color=style.BLACK,
+            markerfacecolor="white",
+            markersize=4.5,
+            label=f"at {value:g}",
         )
     if paths.crossings:
         z = np.array([crossing.eigenvalue for crossing in paths.crossings])
-        ax.plot(z.real, z.imag, "x", color=VERMILION, markersize=7.0, zorder=3.0, label="crosses the unit circle")
+        ax.plot(
+            z.real, z.imag, "x", color=style.VERMILION, markersize=7.0, zorder=3.0, label="crosses the unit circle"
+        )
     radius = ROOM * max(1.0, float(np.abs(paths.eigenvalues).max()))
     ax.set_xlim(-radius, radius)
     ax.set_ylim(-radius, radius)
     ax.set_aspect("equal")
     ax.set_xlabel("Real part of z")
     ax.set_ylabel("Imaginary part of z")
-    legend_above(ax, columns=4)
+    style.legend_above(ax, columns=4)

@@ -31,21 +31,8 @@ from zwidth.measures.definition import (
     STATUS,
     UNDECIDED,
 )
+from zwidth.show.figures import style
 from zwidth.show.figures.map import hatch_cells, status_patch
-from zwidth.show.figures.style import (
-    BLACK,
-    COLOURS,
-    GREY,
-    LINES,
-    VERMILION,
-    WIDE,
-    bands_of,
-    colour_bar,
-    context,
-    figure,
-    label,
-    number_logarithmic,
-)
 from zwidth.show.units import MINUS, exponent_of, quantity, scaled, spoken_unit
 
 if TYPE_CHECKING:
@@ -119,7 +106,7 @@ def _few_lines(dataset: xr.Dataset, name: str, numeric: Sequence[str], texts: Se
     if dataset[name].dims == ("design",) or len(numeric) > 1:
         return False
     lines = int(np.prod([dataset.sizes[key] for key in texts]))
-    return (lines if numeric else lines / dataset.sizes[texts[0]]) <= len(LINES)
+    return (lines if numeric else lines / dataset.sizes[texts[0]]) <= len(style.LINES)
 
 
 def _split_axes(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -155,10 +142,10 @@ def _curves_figure(dataset: xr.Dataset, names: Sequence[str], along: str) -> Fig
 
 def _panels(width: float, height: float, rows: int, columns: int, count: int) -> tuple[Figure, list[Axes]]:
     """A figure of this size [inches], and `count` axes in its grid of rows and columns, row after row."""
-    drawing, ax = figure(width, height)
+    drawing, ax = style.figure(width, height)
     grid = drawing.add_gridspec(rows, columns)
     ax.set_subplotspec(grid[0])
-    with context():
+    with style.context():
         return drawing, [ax, *(drawing.add_subplot(grid[n]) for n in range(1, count))]
 
 
@@ -174,13 +161,13 @@ def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[in
     missing: list[tuple[str, NDArray[np.uint8]]] = []
     for n, chosen in enumerate(_combinations(dataset, others)):
         y = np.asarray(column.sel(chosen).transpose(along).values, dtype=float)
-        style = _line_style(n) if numeric else _marker_style(n)
+        line_style = _line_style(n) if numeric else _marker_style(n)
         if numeric and len(x) <= MARKED:
-            style |= {"marker": "o", "markersize": 3.2}
-        ax.plot(x, np.where(np.isfinite(y), y, np.nan), zorder=2.0 + 0.01 * n, **style)
+            line_style |= {"marker": "o", "markersize": 3.2}
+        ax.plot(x, np.where(np.isfinite(y), y, np.nan), zorder=2.0 + 0.01 * n, **line_style)
         statuses = status.sel(chosen).transpose(along).values
         if np.isin(statuses, list(SYMBOLS)).any():
-            missing.append((style["color"], statuses))
+            missing.append((line_style["color"], statuses))
     _draw_missing(ax, x, missing)
     if not np.isfinite(column.values).any():
         ax.set_yticks([])
@@ -221,7 +208,7 @@ def _draw_missing(ax: Axes, x: NDArray[Any], missing: Sequence[tuple[str, NDArra
     foot = MARK_HEIGHT * (len(missing) + 0.5)  # share of the panel's new height that the rows take
     ax.set_ylim(low - (high - low) * foot / (1.0 - foot), high)
     ax.yaxis.set_major_locator(TicksAbove(low))
-    ax.axhline(low, color=GREY, linewidth=0.5)
+    ax.axhline(low, color=style.GREY, linewidth=0.5)
     for row, (colour, status) in enumerate(missing):
         for kind, symbol in SYMBOLS.items():
             ax.plot(
@@ -242,7 +229,7 @@ def _name_column(ax: Axes, column: Any) -> None:
     title = "\n".join(wrap(str(column.attrs["title"]), LETTERS - 6, break_long_words=False))
     unit = spoken_unit(str(column.attrs.get("unit", "")))
     if unit:
-        label(ax.yaxis, title, unit)
+        style.label(ax.yaxis, title, unit)
     else:
         ax.set_ylabel(title)
 
@@ -261,9 +248,9 @@ def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
         unit = str(coordinate.attrs.get("units", ""))
         axis.set_label_text(f"{key} [{spoken_unit(unit)}]" if unit else key)
         values = np.asarray(coordinate.values, dtype=float)
-        number_logarithmic(axis, float(values.min()), float(values.max()))
+        style.number_logarithmic(axis, float(values.min()), float(values.max()))
     elif unit := spoken_unit(str(coordinate.attrs.get("units", ""))):
-        label(axis, key, unit, plain=True)
+        style.label(axis, key, unit, plain=True)
         axis.set_major_locator(MaxNLocator(nbins=MOST_TICKS, steps=[1, 2, 2.5, 5, 10]))
     else:
         axis.set_label_text(key)
@@ -283,13 +270,13 @@ def _line_handles(dataset: xr.Dataset, keys: Sequence[str], *, lines: bool) -> I
 
 def _line_style(n: int) -> dict[str, Any]:
     """Colour and dashes of the n-th line."""
-    colour, dashes = LINES[n % len(LINES)]
+    colour, dashes = style.LINES[n % len(style.LINES)]
     return {"color": colour, "linestyle": dashes}
 
 
 def _marker_style(n: int) -> dict[str, Any]:
     """Marks of the n-th combination over an axis of texts: open ones, ever larger, so that none hides another."""
-    colour, _ = LINES[n % len(LINES)]
+    colour, _ = style.LINES[n % len(style.LINES)]
     filled = {} if n == 0 else {"markerfacecolor": "none"}
     return {"color": colour, "linestyle": "none", "marker": POINTS[n], "markersize": 4.0 + 2.0 * n, **filled}
 
@@ -303,8 +290,13 @@ def _combination_text(chosen: dict[str, Any]) -> str:
 
 def _symbol_handle(status: int) -> Line2D:
     """The legend's entry of the symbol of designs with this status."""
-    style: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markersize": 4.5, "color": BLACK}
-    return Line2D([], [], marker=SYMBOLS[status], label=STATUS[status], **style)
+    line_style: dict[str, Any] = {
+        "linestyle": "none",
+        "markerfacecolor": "none",
+        "markersize": 4.5,
+        "color": style.BLACK,
+    }
+    return Line2D([], [], marker=SYMBOLS[status], label=STATUS[status], **line_style)
 
 
 def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
@@ -368,11 +360,11 @@ def draw_heat_map(
         ax.pcolormesh(x, y, np.ma.masked_where(np.isnan(values), 0.0 * values), cmap=PAPER, linewidth=0.0)
         ax.text(0.5, 0.5, constant, transform=ax.transAxes, ha="center", va="center", zorder=4.0)
     elif np.isfinite(scale).any():
-        levels, norm, colours = bands_of(scale)
+        levels, norm, colours = style.bands_of(scale)
         cells = np.ma.masked_where(np.isnan(values), values)
         ax.pcolormesh(x, y, cells, norm=norm, cmap=colours, linewidth=0.0, rasterized=True)
         title, unit = str(column.attrs["title"]), spoken_unit(str(column.attrs.get("unit", "")))
-        colour_bar(ax, levels, norm, colours, title, unit)
+        style.colour_bar(ax, levels, norm, colours, title, unit)
     marked = hatch_cells(ax, x, y, status)
     _name_axis(ax, "x", dataset[first])
     _name_axis(ax, "y", dataset[second])
@@ -411,7 +403,7 @@ def _parallel_figure(dataset: xr.Dataset, names: Sequence[str]) -> Figure:
     """A figure of parallel coordinates: an upright for each axis of the study, and for each column."""
     dims = [str(dim) for dim in dataset[names[0]].dims]
     keys = dims if dims != ["design"] else _listed_axes(dataset)
-    drawing, ax = figure(max(5.6, 1.25 * (len(keys) + len(names)) + 0.8), 4.3)
+    drawing, ax = style.figure(max(5.6, 1.25 * (len(keys) + len(names)) + 0.8), 4.3)
     draw_parallel(ax, dataset, keys, names)
     return drawing
 
@@ -479,7 +471,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
     order = np.argsort(np.where(np.isfinite(shade), shade, -1.0))
     across = np.arange(heights.shape[1])
     lines = [np.column_stack([across, heights[n]]) for n in order if complete[n]]
-    colours = mpl.colormaps[COLOURS](DARKEST * shade[[n for n in order if complete[n]]])
+    colours = mpl.colormaps[style.COLOURS](DARKEST * shade[[n for n in order if complete[n]]])
     ax.add_collection(
         LineCollection(lines, colors=list(map(tuple, colours)), linewidths=thin, alpha=0.75, zorder=2.0)
     )
@@ -493,7 +485,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
         ax.add_collection(drawn)
         ends = [int(np.flatnonzero(~np.isfinite(heights[n]))[0]) for n in incomplete]
         for place in sorted(set(ends)):
-            ax.plot(place, BELOW, "x", color=VERMILION, markersize=5.0, clip_on=False, zorder=4.0)
+            ax.plot(place, BELOW, "x", color=style.VERMILION, markersize=5.0, clip_on=False, zorder=4.0)
             ax.annotate(
                 f"{ends.count(place)} without",
                 (place, BELOW),
@@ -501,7 +493,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
                 textcoords="offset points",
                 va="center",
                 fontsize=7.0,
-                color=VERMILION,
+                color=style.VERMILION,
             )
         stubs = [
             np.array([[end - 1, heights[n, end - 1]], [end, BELOW]])
@@ -525,9 +517,9 @@ def _draw_uprights(ax: Axes, uprights: Sequence[ParallelAxis], keys: int) -> Non
     """Draw the uprights with ticks and names: of the axes, the first `keys` of them, thin; of columns bold."""
     for n, one in enumerate(uprights):
         measured = n >= keys
-        ax.plot([n, n], [0.0, 1.0], color=BLACK, linewidth=1.4 if measured else 0.8, zorder=3.0)
+        ax.plot([n, n], [0.0, 1.0], color=style.BLACK, linewidth=1.4 if measured else 0.8, zorder=3.0)
         for height, text in one.ticks.items():
-            ax.plot([n - 0.025, n], [height, height], color=BLACK, linewidth=0.8, zorder=3.0)
+            ax.plot([n - 0.025, n], [height, height], color=style.BLACK, linewidth=0.8, zorder=3.0)
             ax.annotate(
                 text,
                 (n, height),
@@ -563,7 +555,7 @@ def _parallel_axis(column: Any, values: NDArray[Any]) -> ParallelAxis:
             _in_lines(_with_unit(name, unit)), np.where(np.isfinite(numbers), 0.5, np.nan), {0.5: f"{low:.4g}"}
         )
     measured = "title" in column.attrs  # a column, and no axis of the study
-    logarithmic = low > 0.0 and (high / low > WIDE**2 if measured else column.attrs.get("scale") == "log")
+    logarithmic = low > 0.0 and (high / low > style.WIDE**2 if measured else column.attrs.get("scale") == "log")
     exponent = exponent_of(max(abs(low), abs(high))) if measured and unit else 0
     if scaled(exponent, unit).startswith("10") and 0.01 <= max(abs(low), abs(high)) < 1e4:
         exponent = 0

@@ -14,24 +14,13 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from zwidth import errors
 from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import plural
 from zwidth.device.load import from_document
 from zwidth.device.mechanism_check import masses_moved
-from zwidth.errors import (
-    BeyondLimit,
-    DeviceError,
-    EquilibriumError,
-    LoadError,
-    MeasureError,
-    MissingMeasures,
-    OutOfReach,
-    PostureError,
-    Singular,
-    Spelling,
-)
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import (
     BEYOND_LIMIT,
@@ -204,12 +193,16 @@ class SweepJob:
                     point, to_build_alone = group.batch[piece].at(
                         self.positions if over_workspace else at, *circumstances
                     )
-                except (OutOfReach, Singular, BeyondLimit) as error:  # of the one mechanism that all of them have
+                except (
+                    errors.OutOfReach,
+                    errors.Singular,
+                    errors.BeyondLimit,
+                ) as error:  # of the one mechanism that all of them have
                     status = _status_of(error)
                     missed = group.rows[piece][group.valid[piece]]
                     yield from ((int(row), column, (np.nan, status, "")) for row in missed for column in columns)
                     continue
-                except (PostureError, LoadError, DeviceError):
+                except (errors.PostureError, errors.LoadError, errors.DeviceError):
                     continue  # each design alone says why
                 if over_workspace and self.directions is not None:
                     point = point.along_each(self.directions)
@@ -244,7 +237,7 @@ class SweepJob:
                 point, to_build_alone = group.batch.at(
                     at, *(chosen.get(key) for key in ("direction", "assembly", "model"))
                 )
-            except (PostureError, LoadError, DeviceError):
+            except (errors.PostureError, errors.LoadError, errors.DeviceError):
                 continue  # each design alone says why
             kept = np.flatnonzero(group.valid & ~to_build_alone & (point.status == OK))
             if len(kept):
@@ -282,7 +275,7 @@ class SweepJob:
             result = evaluate(
                 measure.at_wall(self._wanted_walls(designs, point)) if measure.of_wall else measure, point
             )
-        except MeasureError as error:
+        except errors.MeasureError as error:
             yield from [(np.nan, NO_VALUE, error.spelled(as_key))] * len(designs)
             return
         reasons: dict[int, list[str]] = {}
@@ -326,7 +319,7 @@ class SweepJob:
                 status = int(point.status)
                 return (np.nan, status, "") if status != OK else evaluate_safely(lambda: measure.compute(point))
             return self._reduced(one, evaluate(measure, point), lambda: point)
-        except MeasureError as error:
+        except errors.MeasureError as error:
             return np.nan, NO_VALUE, error.spelled(as_key)
 
     def _wanted_walls(self, designs: Ints, point: OperatingPoint) -> WantedWall | WantedWalls:
@@ -433,13 +426,13 @@ class Design:
                 if point.posture is not None and not masses_moved(point.posture).all():
                     from_document(device.document, device.label)  # says what is wrong
                 self.job._cache[name] = same, point.posture
-        except EquilibriumError as error:
+        except errors.EquilibriumError as error:
             raise _NoPoint(NO_EQUILIBRIUM, str(error)) from error
-        except (OutOfReach, Singular, BeyondLimit) as error:
+        except (errors.OutOfReach, errors.Singular, errors.BeyondLimit) as error:
             failure = _NoPoint(_status_of(error))
             self.job._cache[name] = same, failure
             raise failure from error
-        except (PostureError, DeviceError) as error:
+        except (errors.PostureError, errors.DeviceError) as error:
             raise _NoPoint(FAILED, _error_text(error)) from error
         except ValueError as error:
             raise _NoPoint(FAILED, str(error)) from error
@@ -450,16 +443,16 @@ class Design:
         return self.settings.get(key, self.job.fixed_circumstances.get(key))
 
 
-def _status_of(error: OutOfReach | Singular | BeyondLimit) -> int:
+def _status_of(error: errors.OutOfReach | errors.Singular | errors.BeyondLimit) -> int:
     """The status of a design whose handle position this error refuses."""
-    if isinstance(error, BeyondLimit):
+    if isinstance(error, errors.BeyondLimit):
         return BEYOND_LIMIT
-    return OUT_OF_REACH if isinstance(error, OutOfReach) else SINGULAR
+    return OUT_OF_REACH if isinstance(error, errors.OutOfReach) else SINGULAR
 
 
 def _error_text(error: Exception) -> str:
     """An error on one line, with all faults of a device."""
-    if not isinstance(error, DeviceError):
+    if not isinstance(error, errors.DeviceError):
         return str(error)
     return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
 
@@ -495,7 +488,7 @@ def sweep_job(study: Study) -> SweepJob:
     return job
 
 
-def _check_measures(job: SweepJob, spelling: Spelling) -> None:
+def _check_measures(job: SweepJob, spelling: errors.Spelling) -> None:
     """Raises MeasureError where a measure exists for none of three designs: the first, the middle and the last."""
     pending, refused = job.columns, dict[str, str]()
     for number in sorted({0, job.count // 2, job.count - 1}):
@@ -508,8 +501,8 @@ def _check_measures(job: SweepJob, spelling: Spelling) -> None:
         for one in pending:
             try:
                 evaluate(one.measure.at_wall(design.wall), point)
-            except MeasureError as error:
+            except errors.MeasureError as error:
                 refused[one.name] = error.spelled(spelling)
         pending = tuple(one for one in pending if one.name in refused)
     if refused:
-        raise MissingMeasures(refused)
+        raise errors.MissingMeasures(refused)
