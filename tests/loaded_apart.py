@@ -24,7 +24,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from tests.model.joints_apart import FOURTH, Joints, travel, travel_rates
-from zwidth.contact.mechanism.motion_kernel import ready
+from zwidth.contact.mechanism.motion_kernel import set_passive_rates
 from zwidth.contact.mechanism.stepping import accelerate, configure
 from zwidth.contact.mechanism.system import motion_memory, system_of
 from zwidth.loop import Butterworth
@@ -344,7 +344,7 @@ class SimulatedDevice(LoadedDevice):
         lagging = 2 * self.n + np.flatnonzero(self.system.lag_command >= 0)
         x, waiting, memory = np.split(state, [N, N + self.queue * self.d])
         self.memory.angles[:] = self.q
-        ready(self.mech, self.memory.angles, self.memory.work)
+        set_passive_rates(self.mech, self.memory.angles, self.memory.work)
         torques, memory = self.command(self.counts(x), memory)
         line = np.vstack([torques, self.at.torques + waiting.reshape(self.queue, self.d)])
         x = x.copy()
