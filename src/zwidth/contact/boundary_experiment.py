@@ -113,6 +113,7 @@ def find_stable_walls(
     best = max(columns, key=lambda column: column.stiffness)
     within = _stiffness_range(box)
     # a raster of powers of ten may miss a peak between two of its dampings
+    # 1.3: a little beyond the largest damping found; marches begin at half of what is found between the columns
     between = np.linspace(0.0, 1.3 * reach, COLUMNS + 1)[1:] if box is None else np.empty(0)
     tops = np.interp(between, [column.damping for column in columns], [column.stiffness for column in columns])
     more = _largest_stiffnesses(trial, between, 0.5 * tops, FIRST_ZOOM, within, levels=COARSE)
@@ -215,10 +216,12 @@ def _stable_patch(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Floa
         K = _logarithmic_raster(4.0 * heavy / T**2, SOFTEST * light / heavy)
         B = _logarithmic_raster(4.0 * heavy / T, LEAST_DAMPED * light / heavy)
     else:
+        # a raster even in the logarithm cannot begin at 0
         low = max(box.stiffness[0], 1e-3 * box.stiffness[1])
         K = np.geomspace(low, box.stiffness[1], 20)
         B = np.linspace(*box.damping, 24)
     walls = np.stack(np.meshgrid(K, B, indexing="ij"), axis=-1).reshape(-1, 2)
+    # watched for longer as long as none of them comes to rest
     for levels in range(1, LEVELS + 1):
         stable = np.array([observation.stable for observation in observe(trial.linearised(), walls, levels)])
         if stable.any():
@@ -347,6 +350,7 @@ def measure_edges(
     starts = np.column_stack([np.tile(stiffness, 2), np.tile(inside, 2)])
     sign = np.repeat([-1.0, 1.0], k)
     lines = SearchLines(starts, np.column_stack([np.zeros(2 * k), sign]))
+    # of steps: the damping of the tip or, where that is near 0, a share of the largest
     scale = max(abs(place.damping), 0.1 * abs(place.largest_damping))
     low, high = (-np.inf, np.inf) if box is None else box.damping
     farthest = np.where(sign < 0.0, starts[:, 1] - low, high - starts[:, 1])
@@ -389,6 +393,7 @@ def measure_tips(
     lines = SearchLines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
     most = min(most, 1e3 * place.stiffness)
     brackets = march(trial, lines, (1.0 / (TIP_SHARE - 0.03) - 1.0) * start, np.maximum(most - start, 0.0))
+    # 0.1: near the tip the edge in damping moves much more than the stiffness
     tolerance = np.full(len(B), 0.1 * ACCURACY * place.stiffness)
     brackets = bisect(trial, lines, brackets, tolerance)
     brackets = Brackets(start + brackets.stable, start + brackets.unstable, brackets.observations)
@@ -513,6 +518,7 @@ def bisect(
     """Halve the gap between stable and unstable until it is below the tolerance (m,); lines without one stay."""
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
     while True:
+        # 1e-12: nearer than that there is hardly a number between
         lanes = unstable - stable > np.maximum(tolerance, 1e-12 * np.abs(unstable))
         if not lanes.any():
             return Brackets(stable, unstable, beyond)

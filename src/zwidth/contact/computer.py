@@ -310,6 +310,7 @@ def uniform(seed: np.uint64, sample: int, channel: int, draw: int) -> float:
     key = scrambled(seed + np.uint64(0x9E3779B97F4A7C15))
     key = scrambled(key ^ (np.uint64(sample) * np.uint64(0x9E3779B97F4A7C15)))
     key = scrambled(key + np.uint64(2 * channel + draw + 1) * np.uint64(0xD1B54A32D192ED03))
+    # + 0.5: never 0, whose logarithm is taken
     return (float(key >> np.uint64(11)) + 0.5) * 2.0**-53
 
 

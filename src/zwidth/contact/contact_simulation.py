@@ -465,6 +465,7 @@ def bound_of_run(offset: float, growth: float | None) -> float:
     """
     # no exponent above 600, which would overflow
     grown = offset * exp(min(max(growth or 0.0, 0.0) * JUDGED, 600.0))
+    # 10.0: a motion may overshoot its start and still come back
     return max(LARGEST_MOTION, 10.0 * offset, min(grown, FARTHEST))
 
 

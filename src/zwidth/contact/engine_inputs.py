@@ -342,12 +342,14 @@ def dynamics(plant: Plant, lag: float, motions: Floats) -> LinearDynamics:
     energy[x, x], energy[v, v], loss[v, v] = plant.stiffness, plant.mass, plant.damping
     if plant.circulatory is not None:
         A[v, x] -= np.linalg.solve(plant.mass, plant.circulatory)
+        # v . C x, symmetric as a form
         loss[v, x], loss[x, v] = 0.5 * plant.circulatory, 0.5 * plant.circulatory.T
     for i, damper in enumerate(dampers):
         at = 2 * n + i  # its force f:  tau f' + f = b v
         A[v, at] = -np.linalg.solve(plant.mass, damper.along)
         A[at, v] = damper.damping / damper.time_constant * damper.along
         A[at, at] = -1.0 / damper.time_constant
+        # as a spring of b / tau, which stores f^2 tau / (2 b), in series with a dashpot b, which takes f^2 / b
         energy[at, at] = damper.time_constant / damper.damping
         loss[at, at] = 1.0 / damper.damping
     drive[v] = plant.actuator
@@ -393,6 +395,7 @@ def substep(dynamics: LinearDynamics, h: float) -> Substep:
     loss, work = np.zeros((M, M)), np.zeros((M, M))
     loss[:N, :N] = dynamics.loss
     # the actuator's power is (force . X)(drive . X), symmetric as a form
+    # without lag the force is the command itself, the first of the inputs
     force = np.concatenate([dynamics.force, np.eye(1, F)[0] * (not dynamics.force.any())])
     drive = np.concatenate([dynamics.drive, np.zeros(F)])
     work[:] = 0.5 * (np.outer(force, drive) + np.outer(drive, force))

@@ -248,6 +248,7 @@ def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Flo
     T, parts = loop.loop.period, loop.parts
     stiffness = abs(loop.wall_stiffness) + abs(loop.wall_damping) / T
     steps = [abs(part.weight) * part.step for part in parts.counters if part.step > 0.0]
+    # an encoder step, and amplitudes at which friction, limit and bent springs are as strong as the wall
     scales = list(steps)
     if stiffness > 0.0:
         scales += [part.coulomb / stiffness for part in parts.friction]
@@ -265,6 +266,7 @@ def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Flo
         for k in range(STEPS_RESOLVED):
             # amplitudes at which the sine reaches another threshold to either side, and the gain jumps
             for edge in (k + 0.5 - middle, k + 0.5 + middle):
+                # in steps above the edge: close to it, where the gain is steep, then evenly to the next
                 inside = np.concatenate([[1e-9, 1e-4, 1e-2], np.linspace(0.04, 0.98, 12)])
                 grid = np.append(grid, step * (edge + inside))
     grid = np.unique(grid)

@@ -119,6 +119,7 @@ def simulate_batch(
     _check_durations(lengths, substeps)
     held_devices, index = _held_devices(runs)
     period = np.array([held_device.loop.period for held_device in held_devices])[index]
+    # 1e-12: a whole number of periods that rounding has made a little longer gets no sample more
     samples = np.array([1 + ceil(length / T * (1.0 - 1e-12)) for length, T in zip(lengths, period, strict=True)])
     m, S = len(runs), int(samples.max())
     if not trail and not ledger and not any(held_device.elements for held_device in held_devices):

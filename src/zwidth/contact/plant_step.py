@@ -417,6 +417,7 @@ def coulomb_force(level: float, v0: float, w: float, mobility: float) -> float:
     if push >= -brake:
         return -side * w / mobility
     slid = v0 / (v0 - w + brake)  # share of the substep until it stops
+    # (push + brake) (1 - slid): the velocity at the end, the other way; the force is what makes it of w
     return side * ((push + brake) * (1.0 - slid) - w) / mobility
 
 

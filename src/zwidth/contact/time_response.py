@@ -301,6 +301,7 @@ def _at_rest(response: TimeResponse, last: slice) -> bool:
 
 def _rms(signal: Floats) -> float:
     """Root mean square under a Hann window, in the signal's unit; inf or nan where the largest value is that."""
+    # without the zeros at both ends of the window
     weight, size = np.hanning(len(signal) + 2)[1:-1], float(np.abs(signal).max(initial=0.0))
     if not 0.0 < size < np.inf:
         return size

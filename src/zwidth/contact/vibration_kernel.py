@@ -123,6 +123,7 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
         b = min(b, STOPPED * loop.period / strongest) if strongest > 0.0 else 0.0
         for i in range(N):
             for j in range(n):
+                # over T, since velocities are in metres per sample
                 A[i, n + j] -= b * loop.force_inputs[i, p] * loop.friction_motions[p, j] / loop.period
     first = VELOCITIES + f + len(loop.step)
     for s in range(len(loop.cubic)):
@@ -219,6 +220,7 @@ def transition(
             if loop.whole_delay == 0:
                 row += (new * passes) * command
             else:
+                # the queue holds forces that the limit has cut already
                 row[N + loop.whole_delay - 1] += new
             if loop.fractional_delay > 0.0:
                 row[N + loop.whole_delay] += old
@@ -308,6 +310,7 @@ def vibrations(loop: LoopArrays, sizes: Floats, size: float, by_velocity: bool) 
     for k in range(M):
         # of a pair the one above the real axis; a root on its negative side may be rounded to below it
         root = roots[k] if np.angle(roots[k]) > CREEPS - np.pi else np.conj(roots[k])
+        # the angle of a root so near to 0, as of forces in the queue, is rounding
         if not (np.angle(root) > CREEPS and abs(root) > 1e-6):
             continue
         reading, whole = 0.0j, 0.0
@@ -376,6 +379,7 @@ def iterate_vibration(
                 break
         # slow or swinging progress: smaller steps
         if change > 0.7 * before:
+            # 0.05: no smaller, so that it still gets on
             weight = max(0.6 * weight, 0.05)
         before, z = change, roots[k]
         for i in range(len(now)):

@@ -232,7 +232,7 @@ def _simulate_small_start(
     quantum = reading_step(loop.plant)  # encoder step of the reading [m], 0 without
     starts = [COUNTS * quantum] if quantum else [SMALL]
     starts += [0.5 * cycle.amplitude for cycle in cycles]
-    frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period
+    frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period  # unknown: a hundred samples a period
     return _simulate_starts(loop, K, B, offset, [min(starts)], frequency)[0]
 
 
@@ -251,7 +251,7 @@ def _simulate_large_starts(
     starts = [deep * limit / K for deep in DEEP] + [
         STARTS[-1] * cycle.amplitude for cycle in cycles if cycle.within_range and not cycle.stable
     ]
-    frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period
+    frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period  # unknown: a hundred samples a period
     within = sorted({start for start in starts if start < largest})
     return _simulate_starts(loop, K, B, offset, within, frequency) if within else []
 

@@ -115,6 +115,7 @@ def isotropy_frobenius(jacobian: ArrayLike, freedoms: int | None = None) -> Floa
     """
     values, used = singular_values(jacobian, freedoms)
     with np.errstate(divide="ignore", invalid="ignore"):
+        # over the largest, so that no square overflows; the product does not change
         scaled = values / values[..., :1]
         product = np.where(used, scaled**2, 0.0).sum(axis=-1) * np.where(used, 1.0 / scaled**2, 0.0).sum(axis=-1)
         ratio = np.sqrt(product) / used.sum(axis=-1)
@@ -137,6 +138,7 @@ def dynamic_isotropy(mass_matrix: ArrayLike) -> Floats:
     """
     M, unknown = _without_nan(mass_matrix)
     values: Floats = np.asarray(np.linalg.eigvalsh(M), dtype=np.float64)
+    # an eigenvalue below 0 is rounding of a motion without mass
     ratio = _ratio(values[..., -1], np.maximum(values[..., 0], 0.0))
     return np.asarray(np.where(unknown, np.nan, ratio))
 

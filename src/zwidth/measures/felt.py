@@ -259,6 +259,7 @@ def _motion_deviation(
     # paths of one measurement share its error, so that their derivatives add up
     for name, slope in slopes.items():
         source = port.origin[name]
+        # a path that is taken from another one has that measurement's error, as a share of its size
         scale = np.abs(paths[name]) / np.maximum(np.abs(paths[source]), 1e-300) if name != source else 1.0
         by_source[source] = by_source.get(source, 0.0 * law) + slope * scale
     return np.asarray(np.sqrt(sum((np.abs(s) * deviations[name]) ** 2 for name, s in by_source.items())))

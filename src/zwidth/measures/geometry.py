@@ -62,6 +62,7 @@ def segment_distance(first: ArrayLike, last: ArrayLike, other_first: ArrayLike, 
     det = a * c - b * b
     with np.errstate(divide="ignore", invalid="ignore"):
         at, other = (b * e - c * d) / det, (a * e - b * d) / det
+    # nearly parallel ones, whose det is rounding, are as near at one of their ends
     inner = (at >= 0.0) & (at <= 1.0) & (other >= 0.0) & (other <= 1.0) & (det > 1e-12 * a * c)
     gap = w + np.where(inner, at, 0.0)[..., None] * u - np.where(inner, other, 0.0)[..., None] * v
     crossing = np.where(inner, np.linalg.norm(gap, axis=-1), np.inf)

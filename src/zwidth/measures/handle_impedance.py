@@ -368,6 +368,7 @@ class RestCompliance:
         """Whether no wall with K > 0 is felt stiffer than the limit."""
         if not self.is_held:
             return True
+        # what comes to `held` with a finite K then is above 0 and falls to 0 as K grows
         return self.held >= 0.0 and not self.sliding and (not self.exchange or (self.exchange > 0.0 < self.sensor))
 
 
@@ -387,12 +388,14 @@ def rest_compliance(plant: Plant, handle: Floats, gain: float = 0.0) -> RestComp
         g, q = float(free_h @ free_a) / moved, float(free_h @ free_s) / moved
         if _slips(free_h, free_s, free_a, g, q):
             return RestCompliance(False)
+        # + gain: the force at the actuator moves the handle by gain g c/(1 + K c) more
         return RestCompliance(True, _held(h, s, a, g, q, spring), (q + gain) * g, np.inf)
     if np.any(free_h):  # no wall force acts along the free motion that it is read from
         return RestCompliance(False)
     # motion of the handle by the wall's force, of the sensor by the hand's, and of the sensor by the wall's
     by_force, read_push, c = _modal_sum(h, a, spring), _modal_sum(s, h, spring), _modal_sum(s, a, spring)
     if c == 0.0:
+        # s^T x is `read_push` whatever K is; the wall's force -K s^T x moves the handle by `by_force` per newton
         return RestCompliance(True, _modal_sum(h, h, spring) + gain * by_force, sliding=-by_force * read_push)
     g, q = by_force / c, read_push / c
     return RestCompliance(True, _held(h, s, a, g, q, spring), (q + gain) * g, c)

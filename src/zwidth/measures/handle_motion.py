@@ -118,7 +118,7 @@ class HandleMotion:
         stiffness = (
             s[..., None] ** 2 + 2.0 * modes.decay[:, None] * s[..., None] + modes.frequency_squared[:, None]
         )
-        # a mode that does not move has no number either where its frequency is filled up with 0
+        # a mode that is filled up with 0, of a device that has fewer than others, adds 0
         G = [np.sum((one * other)[:, None] / stiffness, axis=-1) for one, other in ((h, h), (h, a), (y, h))]
         if modes.coupled is None or modes.drag is None or not modes.coupled.any():
             return tuple(G)
@@ -223,9 +223,11 @@ def frequencies_in_band(
     wide = np.max(np.abs(modes.decay), axis=1, keepdims=True)
     # resonances and antiresonances [rad/s], and with those of the loop all centres and their half widths
     places = np.concatenate([np.sqrt(np.maximum(w2, 0.0)), *_antiresonances(w2, h2)], axis=1)
+    # 1e-3: whose logarithm is finite, for roots of 0
     size = np.clip(np.abs(roots), 1e-3, 1.0)
     centres = np.concatenate([places, np.abs(np.angle(roots)) / period[:, None]], axis=1)
     wide = np.concatenate([wide + 0.0 * places, -np.log(size) / period[:, None]], axis=1)
+    # 0.3: two widths below a centre are still above 0
     beside = [centres + side * np.minimum(wide, 0.3 * centres) for side in (-2.0, -0.5, 0.0, 0.5, 2.0)]
     extra = np.concatenate(beside, axis=1) / (2.0 * np.pi)
     every = np.concatenate([grid, np.clip(extra, low[:, None], high[:, None])], axis=1)
@@ -415,6 +417,7 @@ def _least_ratio_of_loop(loop: Loop, K: float, B: float, low: float, high: float
     """Least impedance ratio of one loop on a wall K [N/m], B [N s/m] over a band [Hz], tried at many frequencies:
     its modes may have no real form."""
     roots = eigenvalues(loop, K, B).ravel()
+    # resonances and their half widths per sample, as in `frequencies_in_band`
     centres, wide = np.abs(np.angle(roots)), -np.log(np.clip(np.abs(roots), 1e-3, 1.0))
     beside = [centres + side * np.minimum(wide, 0.3 * centres) for side in (-2.0, -0.5, 0.0, 0.5, 2.0)]
     extra = np.clip(np.concatenate(beside) / (2.0 * np.pi * loop.period), low, high)

@@ -174,6 +174,7 @@ def _condition(J: Floats, power: Floats, x: Floats) -> Floats:
 def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
     """Slope of log kappa of the homogeneous Jacobian at the length e^x, against x."""
     H = J * np.exp(x[..., None, None] * power)
+    # dH/dx = power * H, entry by entry
     U, s, V = np.linalg.svd(H, full_matrices=False)
     growth = np.einsum("...ik,...ij,...kj->...k", U, power * H, V) / s  # of each singular value, relative
     if norm == "two":

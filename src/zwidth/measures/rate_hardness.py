@@ -172,6 +172,7 @@ def _steepest_rate(
         samples = max(samples, min(MOST_SAMPLES, int(PERIODS * 2.0 * np.pi / (slowest * T)) + 1))
     if lag > 0.0:
         fastest = max(fastest, 1.0 / lag)
+    # so many that a quarter of the fastest vibration has FINEST of them, a whole sample no more than FINEST
     pieces = min(FINEST, 1 + int(2.0 * FINEST * fastest * T / np.pi))
     _fill_generator(w2, drag, h, a, hh, lag, A)
     early, late = (1.0 - fraction) * T / pieces, fraction * T / pieces
@@ -186,6 +187,7 @@ def _steepest_rate(
         y = 0.0
         for j in range(m):
             y += s[j] * state[j]
+        # of the steady motion r t, which was there before the contact, the estimate is r itself
         speed = ratio + _velocity_estimate(loops, c, y, past, memory)
         force = -_filtered_command(loops, c, lagging, K * (ratio * k * T + y) + B * speed, memory)
         for j in range(whole, 0, -1):

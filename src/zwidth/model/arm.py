@@ -142,6 +142,7 @@ def _arm_posture(arm: Arm, place: Floats) -> Floats:
             break
         angles = moved
     distance = float(np.linalg.norm(goal - Motions(mech, angles).handle.position))
+    # the search broke off, or its steps ran out, within a nanometre, above the rounding of REACHED: near enough
     if distance <= 1e-9:
         return angles
     raise OperatorError(

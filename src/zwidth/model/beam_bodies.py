@@ -162,7 +162,7 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
         """Shapes, at places (q,) [m] along the beam, of the tip's displacement in x, y and z and of its twist."""
         bent = bending_deflections(places, loads)[..., :1] * (3.0 / L**3)
         stretched = bar_deflections(places, loads) / L
-        by_family = assembled(bent, bent, stretched, stretched)
+        by_family = assembled(bent, bent, stretched, stretched)  # y, z, x and twist, in this order
         return Shapes(*(field[..., [2, 0, 1, 3]] for field in by_family))
 
     panels = gauss_panels(np.union1d(_loaded(at), [0.0, L]), ELEMENT_ORDER)
@@ -175,7 +175,7 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
     mass = np.block([[rod_inertia(beam), coupling], [coupling.T, np.diag([*lump, BAR_LUMP * I])]])
     return FlexibleBody(
         mass,
-        np.diag(np.diag(tip.stiffness)),
+        np.diag(np.diag(tip.stiffness)),  # off it is rounding
         at,
         tip.displacement[:-1],
         tip.rotation[:-1],

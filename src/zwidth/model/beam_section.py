@@ -101,6 +101,7 @@ def rectangle(width: float, height: float) -> CrossSection:
     check_number("height", height, "m", above=0.0)
     a, b = max(width, height), min(width, height)
     # tanh x = 1 - 2 / (exp(2 x) + 1): the ones sum to a constant, and the rest falls at least by exp(-2 pi) a term
+    # 700 keeps exp from an overflow; its term is 0 by then
     rest = sum(2.0 / (n**5 * (exp(min(n * pi * a / b, 700.0)) + 1.0)) for n in range(1, 12, 2))
     J = a * b**3 / 3.0 * (1.0 - 192.0 * b / (pi**5 * a) * (ODD_FIFTH_POWERS - rest))
     return CrossSection(width * height, width * height**3 / 12.0, height * width**3 / 12.0, J)

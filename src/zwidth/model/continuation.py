@@ -106,6 +106,7 @@ def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float
         settled = largest_magnitude(gaps, count) < rounding
         if not settled and (not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last_size)):
             return -1.0
+        # once the gaps are rounding, a step that is no smaller than the last would only stir it
         if not settled or size < last_size:
             apply_step(mech, design, angles, work)
         ratio = size / last_size if last_size > 0.0 else 1.0
@@ -238,7 +239,7 @@ def joint_beyond_limit(mech: MechanismArrays, design: int, angles: Floats) -> in
             continue
         beyond = max(low - angles[i], angles[i] - high)
         if kind[i] == REVOLUTE and beyond > 0.0:
-            # the first whole turn that brings the angle above its lower limit
+            # the first whole turn that brings the angle above its lower limit, or to it but for ROUNDING of a turn
             turns = np.ceil((low - angles[i]) / (2.0 * np.pi) - ROUNDING)
             beyond = angles[i] + 2.0 * np.pi * turns - high
         if beyond > LIMIT_TOLERANCE * (mech.size[design] if kind[i] == PRISMATIC else 1.0):
@@ -275,6 +276,8 @@ def reference_batch(mech: MechanismArrays, goals: Floats, angles: Floats, gaps: 
         for j in range(present.size):
             present[j] = rough[j]
         assemble(mech, i, False, present, work)
+        # kept where the handle was not held, or a singularity lies between this posture and the held one, too:
+        # this one then is on the side of the start
         if not held or (_is_closed(mech, i, work, mech.first_row[mech.a.size]) and has_turned(mech, work)):
             _keep_posture(mech, work, angles[i], gaps[i])
 
@@ -380,6 +383,7 @@ def moved_posture(mech: MechanismArrays, angles: Floats, step: Floats) -> Floats
     angles  (n,) of a posture with closed loops [rad], [m]. Free ball joints are not moved
     """
     out = np.array(angles, dtype=np.float64)
+    # 1e4: a limit, so that int takes a step that is inf, too
     parts = 1 + int(min(np.max(np.abs(step), initial=0.0) / STEP, 1e4))
     return out if _move(mech, out, np.array(step, dtype=np.float64) / parts, parts) else None
 

@@ -49,6 +49,7 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
               that nothing holds or brakes though others move it; with poles that are nearly double
     """
     M, B, K, ends, known = _plant_matrices(modes, operator)
+    # sum of |input| times sum of |output|, see `PolePairs`: shares of parts are told against it
     reach = np.where(known, np.abs(ends).sum(axis=2).prod(axis=0), np.nan)
     free = _set_aside_free_motions(B, K, ends)
     N, n = ends.shape[1:]
@@ -122,6 +123,7 @@ def _set_aside_free_motions(B: Floats, K: Floats, ends: Floats) -> Floats:
     stiffest = np.abs(K).max(axis=(1, 2), initial=0.0)
     # stiffer than all others and each other, so that their poles meet none
     apart = 2.0 + 0.37 * np.cumsum(free, axis=1)
+    # 1.0: where nothing else has a stiffness
     K[:, diagonal, diagonal] = np.where(free, apart * np.maximum(stiffest, 1.0)[:, None], K[:, diagonal, diagonal])
     ends[:, free] = 0.0
     return np.asarray(shares)
@@ -223,6 +225,7 @@ def _pole_and_residue(
         enter, leave = enter + ends[0, a] * x[a], leave + ends[1, a] * x[a]
         for k in range(n):
             size += (2.0 * abs(p) * abs(M[a, k]) + abs(B[a, k])) * abs(x[a]) * abs(x[k])
+    # the start is good to SAME_POLE of itself, or to the companion matrix's 1e-9 of the largest pole
     sure = abs(slope) > SHARED * size and abs(p - start) <= SAME_POLE * abs(start) + 1e-9 * largest
     return p, enter * leave / slope, sure
 
@@ -306,6 +309,7 @@ def _join_poles(
             # r/(s - p) + conj: [ 2 Re r s - 2 Re(r conj p) ] / (s^2 + 2 a s + w^2)
             velocity[parts] = 2.0 * r[k].real
             position[parts] = -2.0 * (r[k].real * p[k].real + r[k].imag * p[k].imag)
+            # the largest that `position` can be, as `reach` is in units of position: input times output
             share = 2.0 * abs(r[k]) * abs(p[k]) / reach
             if share <= HIDDEN:
                 velocity[parts], position[parts] = 0.0, 0.0
@@ -317,10 +321,12 @@ def _join_poles(
     for _ in range(count):
         best, at = -1.0, -1
         for k in range(count):
+            # a residue that is nan has been taken
             if p[k].imag == 0.0 and abs(p[k]) > best and r[k] == r[k]:
                 best, at = abs(p[k]), k
         if at < 0:
             break
+        # as of a pair, |r| |p|; a pole near 0 counts as one of 1 rad/s, since its slow part may still be large
         share = abs(r[at]) * max(abs(p[at]), 1.0) / reach
         if share <= UNOBSERVED_UNDAMPED:  # half a part cannot be left out
             return False

@@ -121,6 +121,7 @@ def drive_side(mechanism: Mechanism, posture: Posture) -> DriveSide:
     # a drive moves with its joint, and with those coupled to it
     T = per_joint[:, drives.joint]
     if drives.coupling is not None:
+        # 0 for nan: postures that are not OK have nan in T already
         T = T + per_design(mechanism, drives.coupling, 2)[design] @ np.nan_to_num(per_joint)
     level = np.zeros((1, n)) if links.joint_coulomb is None else per_design(mechanism, links.joint_coulomb, 1)
     rubbing = np.flatnonzero(level.any(axis=0))

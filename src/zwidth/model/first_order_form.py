@@ -70,6 +70,7 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
     ends = np.abs(np.hstack([free, damped_or_elastic]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
     # the motions' parts in the force, summed, times those in the reading: against this rounding is told
     together = float(np.prod(ends.sum(axis=0)))
+    # T^2: a force held for T moves what has the mass 1 by about T^2
     poles, hidden = _poles(A, source, reading, period, together * period**2)
     inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
     if abs(inertia) <= UNOBSERVED_UNDAMPED * together:
@@ -79,7 +80,8 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
         second = _second_output(A, elastic, damped_or_elastic, len(plant.lagged_dampers), period, second_reading)
         direct = float(second_reading[0] @ np.linalg.solve(plant.mass, plant.actuator))
         if np.any(second):
-            # a feedback of it moves poles by what it reads of them: here that counts itself, not a share of all
+            # a feedback of it moves poles by what it reads of them: here that counts itself, not a share of all;
+            # `_poles` multiplies by UNOBSERVED_UNDAMPED, which leaves SECOND_UNREAD
             hidden &= _poles(A, source, second, period, SECOND_UNREAD / UNOBSERVED_UNDAMPED)[1]
     # poles at 0 of the places of braked motions that A leaves out: it has one state at most for all of them
     unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
@@ -119,6 +121,7 @@ def _split_motions(plant: Plant, second_reading: Floats | None) -> tuple[Floats,
     ends += [] if second_reading is None else list(second_reading)
     separated, moved = separated_modes(plant, squared, shapes, np.array(ends))
     idle = ~moved & (squared != 0.0)
+    # motions without stiffness as they were: what brakes them splits them below
     shapes = np.where(squared == 0.0, shapes, separated)
     drag = _drag(plant)
     rigid, elastic = shapes[:, squared == 0.0], shapes[:, (squared != 0.0) & ~idle]
@@ -156,6 +159,7 @@ def _state_matrices(plant: Plant, braked: Floats, basis: Floats, period: float) 
     n = first_velocity + k + len(lags)
     A, source, reading = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     if size > 0.0:
+        # the state is what is read of all braked motions, over `size`, so that its weights have length 1
         A[0, first_velocity : first_velocity + b], reading[0] = read / size / period, size
     elastic_at = slice(first_velocity - (k - b), first_velocity)
     A[elastic_at, first_velocity + b : first_velocity + k] = np.eye(k - b) / period
@@ -196,6 +200,7 @@ def _poles(
     still = poles == 0.0
     # |(exp(s T) - 1)/s|: what a unit force held for T leaves
     reach = np.where(still, period, np.abs(np.expm1(poles * period)) / np.where(still, 1.0, np.abs(poles)))
+    # a residue is (left . source) (reading . right) / overlap; of a pole that is not single it is not told
     reach = reach / np.where(single, np.abs(overlap), 1.0)
     gain = np.abs((left.conj().T @ source) * (reading @ right)) * reach
     rounding = ROUNDING * (np.abs(left.T) @ np.abs(source)) * (np.abs(reading) @ np.abs(right)) * reach
@@ -206,6 +211,7 @@ def _poles(
     # an undamped motion that the wall hardly moves could only hide the stability of the rest
     least = np.where(np.abs(poles.real) * period < 1e-9, UNOBSERVED_UNDAMPED * alone_gain, least)
     hidden = single & (gain <= np.maximum(least, rounding))
+    # conjugates are hidden together or not at all
     return poles, hidden & hidden[_partners(poles)]
 
 

@@ -180,6 +180,7 @@ def unit_of_push(screw: Floats) -> str:
 
 def vector_text(values: Floats) -> str:
     """A vector in words, "(0, -5, 0)"."""
+    # + 0.0 makes 0 of -0
     return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"
 
 

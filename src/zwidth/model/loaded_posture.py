@@ -81,6 +81,7 @@ def loaded_postures(
             one_mechanism = change_designs(mechanism, single, shape)
             found = _loaded_posture(one_mechanism, posture.with_axes(single), screws[index], load, counts_motors)
         except LoadError as error:
+            # a posture without equilibrium says nothing of others; any other LoadError holds for all of them
             refused = refused if isinstance(error, EquilibriumError) else error
             changed.status[index] = NO_EQUILIBRIUM
             for array in numbers:
@@ -205,7 +206,7 @@ def _slid(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balances
         raise LoadError("settle is for loads on a handle whose position the drives control; leave it out")
     k, u, force = len(mechanism.driven), screw[:3], load.force
     ways, sizes, _ = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
-    reached = ways[:, sizes > 1e-9 * sizes[0]]
+    reached = ways[:, sizes > 1e-9 * sizes[0]]  # directions in which the drives move the handle at all
     across = reached @ np.linalg.svd((u @ reached)[None])[2][1:].T  # the ways along the surface
     size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
     start = balances.solve(at).handle_place
@@ -437,7 +438,7 @@ def _links_stiffness(equilibrium: Equilibrium) -> Floats:
     felt = 0.0 if load.hand == "neglected" else 1.0
     force, moment = felt * equilibrium.hand_force, felt * equilibrium.hand_moment
     K = np.tensordot(force, handle.speed_2, 1) + np.tensordot(moment, handle.turning, 1)
-    if load.hand == "follower":  # the force turns by W dp with the handle's link
+    if load.hand == "follower":  # the force turns by W dp with the link, W = handle.spin
         K = (
             K
             + handle.speed.T @ np.cross(handle.spin.T, force).T
@@ -505,7 +506,8 @@ def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: 
     """The motions apart with the stiffness that they have where springs give way to them and a stiff wall holds
     the reading:
 
-        K_ss - [K_sm 0] [K_mm a_m; c_m^T 0]^-1 [K_ms; 0]      K with what the computer adds, actuator a, sensor c
+        K_ss - [K_sm 0] [K_mm a_m; c_m^T 0]^-1 [K_ms; 0]      K with what the computer adds, actuator a, sensor c;
+                                                          m: of `moved`, s: of `still`
 
     The second part is of the order of the load's square over the drives' stiffness. So is all that is left of the
     first where the links' half and the computer's cancel.
@@ -523,6 +525,7 @@ def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: 
     K = np.diag(np.append(moved.squared[held], 0.0)) + ways.T @ added @ ways
     bordered = np.block([[K, (loaded.actuator @ ways)[:, None]], [loaded.sensor @ ways, 0.0]])
     pushed = np.vstack([ways.T @ added @ still, np.zeros((1, still.shape[1]))])
+    # without the last unknown, the wall's force that holds the reading
     change = -(still.T @ added @ ways @ np.linalg.lstsq(bordered, pushed, rcond=None)[0][:-1])
     if apart.circulatory is not None:
         change = change + apart.circulatory

@@ -102,6 +102,7 @@ def _fit_windows(
 ) -> tuple[Complexes, Complexes, Complexes, Floats, Floats]:
     """The first five arrays of `Fits` after its width, of windows of `width` spacings to either side of middles
     (n,): coefficients, factor, cubic, noise and excited."""
+    # windows that would begin before the second value, or end beyond the last, are moved inwards
     starts = np.clip(middles - width, 1, len(U) - 1 - 2 * width)
     index = starts[:, None] + np.arange(2 * width + 1)
     r = (index - middles[:, None]) / width
@@ -180,6 +181,7 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
 def window_widths(last: int, narrowest: int) -> list[int]:
     """Half of each window's width, from the narrowest to what still divides `last` spacings into some tiles."""
     widths = [narrowest]
+    # the next width must leave FEWEST_TILES tiles, and its window, twice as wide, must fit
     while last / (2 * widths[-1]) >= FEWEST_TILES and 4 * widths[-1] <= last:
         widths.append(2 * widths[-1])
     return widths
@@ -232,11 +234,13 @@ def _fit_difference(narrow: Fits, wide: Fits) -> Floats:
     halves = np.minimum(2 * np.arange(count)[:, None] + [0, 1], len(narrow.noise) - 1)
     noise = np.mean(narrow.noise[halves], axis=1)
     for half in halves.T:
+        # two places within the half, at which both windows are evaluated
         for r in (-0.25, 0.25):
             value, spread = narrow.at(half, np.full(count, r))
             # the same place, in spacings of the transform
             k = 1 + narrow.width * half + narrow.width // 2 + r * narrow.width
             predicted, _ = wide.at(np.arange(count), (k - middles) / wide.width)
+            # / AGREED: a difference of TOLERANCE alone then counts as just AGREED
             allowed = spread * noise + (TOLERANCE * np.abs(value)) ** 2 / AGREED
             apart = np.maximum(apart, np.abs(predicted - value) ** 2 / np.maximum(allowed, 1e-300))
     return np.asarray(apart)
@@ -310,7 +314,8 @@ class PieceSums:
         """
         tile = np.arange((len(pieces) + 1) // 2)
         first_piece = np.clip(2 * tile - 1, 0, len(pieces) - PIECES)
-        # of the four pieces, as r in the window
+        # of the four pieces, as r in the window. A piece's last value is a spacing before the next's first: the
+        # middle of its values is half a spacing before that of its stretch, hence 0.5 / width
         middles = [0.5 * (first_piece + j) - tile - 0.25 - 0.5 / width for j in range(PIECES)]
         R = _reduced([pieces[first_piece + j] @ _to_window(middle, 0.25) for j, middle in enumerate(middles)])
         least = UNEXCITED * np.sqrt(most)
@@ -320,6 +325,7 @@ class PieceSums:
             np.sum([one[first_piece + j] for j in range(PIECES)], axis=0) for one in (filled, power)
         )
         blocks = self._blocks * together
+        # values less the four of C in each piece and block, and less those of G
         freedom = blocks * (self._width - SUMMED_TERMS) - (ORDER + 1)
         residual = np.sum(np.abs(R[:, ORDER + 1 :, -1]) ** 2, axis=1)
         factor: Complexes = rows @ np.conj(np.swapaxes(rows, 1, 2))

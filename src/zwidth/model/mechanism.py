@@ -62,7 +62,8 @@ class RatioTable:
 
     @cached_property
     def _coefficients(self) -> Floats:
-        """Coefficients (4, P, k - 1) of P designs' cubics in q less its first entry, highest power first."""
+        """Coefficients (4, P, k - 1) of P designs' cubics, highest power first; the cubic of span i is in
+        q - coordinate[i], the way from the beginning of that span."""
         from scipy.interpolate import PchipInterpolator  # which devices without a table do without
 
         ratio = self.ratio.reshape(-1, len(self.coordinate))
@@ -107,6 +108,7 @@ class RatioTable:
         slack = ROUNDING * (high - low)
         if self.turns:
             outside = (q < low - slack) | (q > high + slack)
+            # by the first whole turn that brings it above the lower end
             q = np.where(outside, q + TURN * np.ceil((low - slack - q) / TURN), q)
         inside = (q >= low - slack) & (q <= high + slack)
         return np.where(inside, np.clip(q, low, high), low), inside

@@ -20,7 +20,8 @@ from zwidth.model.plant import LaggedDamper, Plant, project_onto_motions
 RIGID = 1e-13
 # Relative distance under which two frequencies or damping rates are one: above the rounding of the
 # eigenvalue problem, below anything a mechanism is built to. Of slow modes beside fast ones it is the distance in
-# shares of the larger of their own squared frequency and SLOW_SHARE of the largest.
+# shares of the larger of their own squared frequency and SLOW_SHARE of the largest; the latter counts as no more
+# than AMONG_SLOW times the slowest.
 REPEATED = 1e-10
 SLOW_SHARE = 1e-4
 AMONG_SLOW = 1e3
@@ -70,13 +71,14 @@ def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
     while True:
         slow = among[np.abs(squared[among]) <= WIDE * scale]
         stiffness_of_slow, rounding = _stiffness_and_rounding(stiffness, shapes[:, slow], fastest)
+        # tenfold: well above what may be rounding, lest the search go on in it
         if len(slow) == len(among) or not np.any(np.abs(stiffness_of_slow) > 10.0 * rounding):
             return squared, shapes
         fast = np.setdiff1d(among, slow)
         # what rounding has left of the fast modes in the slow ones, K-orthogonal to which they should be
         remnant = (shapes[:, fast].T @ stiffness @ shapes[:, slow]) / squared[fast, None]
         motions = shapes[:, slow] - shapes[:, fast] @ remnant
-        shapes[:, fast] += motions @ remnant.T
+        shapes[:, fast] += motions @ remnant.T  # so that both stay M-orthogonal
         relative = motions.T @ stiffness @ motions
         found, turned = np.linalg.eigh((relative + relative.T) / 2.0)
         shapes[:, slow] = motions @ turned

@@ -67,6 +67,7 @@ class Motion:
             self.position + arm,
             self.speed + _cross(self.spin, arm),
             self.spin,
+            # alpha x arm + w x (w x arm)
             self.speed_2 + _cross(self.spin_2, arm) + _cross_forms(self.spin, _cross(self.spin, arm)),
             self.spin_2,
         )
@@ -145,6 +146,7 @@ class Motions:
         straight = frame.at(R[:, 0] * beam.body.stations[k])
         bent, turned = (np.zeros_like(frame.speed) for _ in range(2))
         bent[:, columns], turned[:, columns] = R @ beam.body.displacement[k], R @ beam.body.rotation[k]
+        # Coriolis acceleration 2 w x v; and w x the angular velocity against the frame, which turns with it
         bent_2, turned_2 = 2.0 * _cross_forms(frame.spin, bent), _cross_forms(frame.spin, turned)
         own_block = (slice(None), columns, columns)
         bent_2[own_block] += np.tensordot(R, beam.body.displacement_2[k], 1)
@@ -346,6 +348,7 @@ class Motions:
         half = np.linalg.solve(root, M)
         inverse, modes = np.linalg.eigh(symmetric(np.linalg.solve(root, half.T)))
         slowest = modes[:, ::-1]
+        # of stiffness 1 and mass `inverse` each; over its root the mass is 1. abs: rounding may leave one below 0
         return np.asarray(motions @ np.linalg.solve(root.T, slowest) * np.abs(inverse[::-1]) ** -0.5)
 
     def _elastic_scale(self) -> Floats:

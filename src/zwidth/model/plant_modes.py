@@ -107,6 +107,7 @@ def fill_modes(
         # squared frequencies, and the dampers V^T B V between modes
         for k in range(n):
             value = A[k, k]
+            # 2.3e-308, the least normal number: exact zeros alone have a scale of 0
             squared[i, k] = 0.0 if abs(value) <= RIGID * max(scale, 2.3e-308) else value
             for j in range(k):
                 repeated = repeated or abs(A[k, k] - A[j, j]) <= REPEATED * scale
@@ -128,6 +129,7 @@ def fill_modes(
                 enter[i, k] += shapes[r, k] * actuator[i, r]
                 leave[i, k] += shapes[r, k] * sensor[i, r]
                 held[i, k] += shapes[r, k] * handle[i, r]
+        # equal modes, as several free ones are, come out in any combination: dampers may couple these
         coupled[i] = repeated or free > 1 or largest_coupling > REPEATED * largest
         if not positive:
             for k in range(n):

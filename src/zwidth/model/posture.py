@@ -205,7 +205,7 @@ def solve_posture(
         raise singular_throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
     solved = failed_batch(mech, len(goals)) if singular else solve_batch(mech, design, reference, goals)
-    widest = tolerance if tolerance > 0.0 or not shape else None
+    widest = tolerance if tolerance > 0.0 or not shape else None  # of one goal the near one is for its message
     projected, near = _project_goals(mech, design, reference, goals, solved, widest)
     posture = _posture_of_batch(name, mech, goals, solved, projected, shape)
     if not shape and posture.status != OK:
@@ -550,7 +550,7 @@ def describe_goal(mech: MechanismArrays, goal: Floats) -> str:
 
 def _vector_text(values: Floats) -> str:
     """A vector in words, "(0, -5, 0)"."""
-    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"
+    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"  # + 0.0: no -0
 
 
 def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:

@@ -111,6 +111,7 @@ def by_roadmap(mech: MechanismArrays, design: int, reference: Floats, goals: Flo
         for nodes in road.nearest_nodes(goals[missed], 4).T:
             retry = solve_from_starts(mech, designs[missed], road.angles, nodes, goals[missed])
             better = retry.status == OK
+            # singular or beyond a limit says more than out of reach
             better |= (retry.status != OUT_OF_REACH) & (solved.status[missed] == OUT_OF_REACH)
             solved.overwrite(missed[better], PostureBatch(*(values[better] for values in vars(retry).values())))
     return solved

@@ -140,7 +140,9 @@ def _narrowest_window(least: int, count: int, values: int, segment: int | None) 
 
     least  below which it must not be;   segment  samples, as in `sweep_response`
     """
+    # half a segment's spacing, or a width that makes MOST_TILES of them; 2 * (... // 2) is even
     narrowest = max(least, 2 * (count // (4 * segment)) if segment else 2 * (values // (2 * MOST_TILES)))
+    # a window lies beside the first value and has one more than twice this
     return min(narrowest, 2 * ((values - 2) // 4))
 
 
@@ -244,6 +246,7 @@ class _ForceSize:
     @property
     def broad(self) -> bool:
         """Whether the force holds many frequencies at a time, as noise does and a sweep does not."""
+        # on the average a quarter of the PIECE / 2 frequencies of a piece take part
         return self.shared > 0.25 * PIECE / 2.0 * self.power
 
 
@@ -272,6 +275,7 @@ def _hidden_by_steps(
     other_motion = np.maximum(above[slower] - step**2 / 4.0, 0.0)
     amplitude = np.sqrt(2.0 * force.variance)
     steps = np.abs(local.value) / gain * amplitude / step
+    # 2 q / pi, times 0.7 (q / A)^(1/2) where A is above half a step; over the force's amplitude: as error of P
     largest = 2.0 / np.pi * np.minimum(1.0, 0.7 / np.sqrt(np.maximum(steps, 1e-9))) * step / amplitude
     return np.asarray(largest * np.exp(-2.0 * np.pi**2 * other_motion / step**2) / LARGEST_IN_DEVIATIONS)
 
@@ -289,6 +293,7 @@ def _places(samples: int, segment: int | None) -> Floats:
     length; segment as in `sweep_response`."""
     whole = 2 ** int(np.log2(samples))
     spacing = 1.0 / segment if segment else CLOSEST / whole
+    # evenly, up to where RATIO of a frequency is as wide as the spacing; above that RATIO apart
     first = np.arange(2.0 if segment else 1.0, 1.0 / RATIO) * spacing
     first = first[first < 0.5]
     steps = np.ceil(np.log(0.5 / first[-1]) / RATIO)
@@ -339,6 +344,7 @@ def _common_step(differences: Floats, least: float) -> float:
     shares = changed[changed < CLOSE * step] / step
     multiples = np.rint(shares)
     whole = np.abs(shares - multiples) < WHOLE
+    # no change at all, which is not in `changed`, counts as one more multiple, 0
     several = len(np.unique(multiples)) + (len(changed) < len(differences)) > 1
     standing = 2 * len(changed) < len(differences)  # readings without steps never stand still
     enough = several and (len(shares) >= FEWEST or standing)

@@ -414,6 +414,7 @@ def _rigid_motion(plant: Plant) -> tuple[float, Floats]:
     participation = Z.T @ plant.actuator
     mobility = float(participation @ participation)
     whole = float(plant.actuator @ np.linalg.solve(plant.mass, plant.actuator))
+    # squared, since a mobility goes with the square of a participation
     if not mobility > READING_TOLERANCE**2 * whole:
         raise ModelError(
             "the plant has no rigid mode that the actuator moves: a spring ties it to the ground; use 'full'"

@@ -152,6 +152,7 @@ def _modes_of_reduced(numbers: EffectiveParameters, model: Model, coefficients: 
     k, mass = numbers.stiffness.ravel(), numbers.rigid_mass.ravel()
     # of each mode: decay, squared frequency, participation of force and reading, that of the handle
     if model == "rigid":
+        # 0.0 * mass: 0 of the same shape, but nan where the mass is
         modes = [(0.5 * r_m + 0.0 * mass, 0.0 * mass, 1.0 / np.sqrt(mass), 1.0 / np.sqrt(mass))]
     else:
         mu = 1.0 / (1.0 / m1 + 1.0 / m2)

@@ -174,6 +174,7 @@ def low_frequencies(response: Response) -> LowFrequencies:
     good = usable_frequencies(response)
     error = None
     if response.coherence is not None:
+        # of the complex error, both its parts together
         error = np.sqrt(2.0) * relative_error(response.coherence[good], response.averages)
     return fit_low_frequencies(response.frequency[good], response.value[good], error)
 
@@ -190,6 +191,7 @@ def integrators_of(response: Response, period: float) -> int:
     """
     good = usable_frequencies(response)
     f, P = response.frequency[good], response.value[good]
+    # the first octave, in which the slope of |P| is fitted, and at least three frequencies; the phase is of three
     lowest = slice(0, max(3, int(np.searchsorted(f, 2.0 * f[0], side="right"))))
     z_less_1 = np.exp(2j * np.pi * f[:3] * period) - 1.0
     P_times_power = P[:3] * z_less_1 ** np.arange(3)[:, None]
@@ -199,6 +201,7 @@ def integrators_of(response: Response, period: float) -> int:
     where = f"the phase is {measured:.0f} degrees at {f[0]:.6g} Hz, the lowest frequency"
     nearest = int(np.argmin(np.abs(phases)))
     clear, settled = abs(phases[nearest]) < CLEAR, abs(phases[nearest]) < SETTLED
+    # an exponent outside of 0 to 2.5 is that of a resonance or of noise, and contradicts nothing
     unlike = abs(exponent - nearest) > UNLIKE and 0.0 <= exponent <= 2.5
     fit = low_frequencies(response) if unlike or not settled else None
     if fit is not None and fit.first_seen and fit.first_seen[1] < 0.0 and fit.terms[2] < 0.0:
@@ -291,6 +294,7 @@ def _scatter(sweeps: Complexes, mean: Complexes) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         single = np.sum(np.abs(sweeps / mean - 1.0) ** 2, axis=0) / ((repeated - 1) * repeated)
     padded = np.pad(np.where(np.isfinite(single), single, 0.0), POOLED // 2, mode="reflect")
+    # the larger of its own scatter, if that is a number, and the mean with its neighbours
     return np.asarray(np.fmax(single, np.convolve(padded, np.full(POOLED, 1.0 / POOLED), mode="valid")))
 
 

@@ -121,6 +121,7 @@ def _build(contents: _Contents) -> Roadmap:
 
     search = cKDTree(goals * scale)
     low, high = goals.min(axis=0)[:3], goals.max(axis=0)[:3]
+    # no width is 0, by which is divided
     extent = np.maximum(high - low, 1e-9 * size)
     if mech.controls == POSE:
         no_cells = np.zeros(0, dtype=np.int64)
@@ -158,8 +159,10 @@ def close_loops(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> b
         size = closure_step(mech, work)
         moved += size
         if not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last):
+            # rounding moves it to and fro where the loops are closed already
             return bool(largest_magnitude(work.gaps, loops) < 1e-13 * mech.size[0])
         apply_step(mech, 0, angles, work)
+        # the square of it, which is what Newton leaves, is rounding
         if size < 1e-7:
             return True
         last = size
@@ -240,6 +243,7 @@ def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> 
         pitch = max(pitch, pitches[drive])
     place_links(mech, 0, reference, work)
     equations(mech, 0, work)
+    # nodes may be nearer to a singularity than the reference, down to this share of its reciprocal condition
     margin = 0.3 * min(passive_rates(mech, 0, work), newton_step(mech, 0, work))
     substeps = int(min(16.0, np.ceil(MARGIN * pitch / margin))) if margin > 0.0 else 16
     margin = min(margin, MARGIN * pitch)

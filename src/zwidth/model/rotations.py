@@ -99,6 +99,7 @@ def _quaternion(v: tuple[float, float, float]) -> tuple[float, float, float, flo
     """Unit quaternion w, x, y, z of a rotation vector [rad]."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     angle = sqrt(square)
+    # sin(angle / 2) / angle, by its series where the angle is small
     share = 0.5 - square / 48.0 if angle < 1e-4 else sin(0.5 * angle) / angle
     return cos(0.5 * angle), share * v[0], share * v[1], share * v[2]
 

@@ -136,6 +136,7 @@ def _check_array_bounds(environment: Environment) -> None:
 
     It is called as Python at a few motions, in and out of a wall.
     """
+    # 1.0 stands for a parameter without default: any number will do
     values = np.array([1.0 if np.isnan(p.default) else p.default for p in environment.parameters])
     memory = np.zeros(MEMORY)
     for position, velocity in ((1e-3, 0.1), (1e-3, -0.1), (-1e-3, 0.1), (0.0, 0.0)):

@@ -124,6 +124,7 @@ def friction_patch(
         memory[INSIDE], memory[STRETCH], memory[LAST] = 1.0, 0.0, position
     stretch = memory[STRETCH] + position - memory[LAST]
     longest = friction / stiffness
+    # C/K while it slides; rho C/K, at which it breaks away, while it sticks
     if abs(stretch) > (longest if memory[SLIDING] > 0.0 else breakaway * longest):
         stretch = np.sign(stretch) * longest
         memory[SLIDING] = 1.0

@@ -353,11 +353,13 @@ def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, s
         reachable = gain > 1e-9  # elsewhere the handle cannot move towards the surface at all
         if not reachable.any():
             break
+        # depths are negative here: the goals lie against the normal, where a flat surface has the depth 0
         goals = at[reachable] + (depth[reachable] / gain[reachable])[:, None] * ways[reachable]
         solved = solve_posture(mechanism, goals, posture.assembly)
         if np.any(solved.status == OK):
             at, depth = goals[solved.status == OK], depth_and_normal(surface, goals[solved.status == OK])[0]
             normal = depth_and_normal(surface, at)[1]
+            # touched to within a nanometre
             if np.max(depth) > -1e-9:
                 return
         else:
@@ -469,8 +471,10 @@ def motion_inputs(
 
     duration  [s];   push, gravity  as in `simulate_mechanism`;   drives  their number
     """
+    # 1e-9: a whole number of periods that rounding has made a little longer gets no sample more
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))
     check_memory(
+        # numbers that are kept of each sample, roughly
         samples * (23.0 + 12.0 * drives),
         f"{samples} samples of a motion of {duration:g} s",
         "simulate a shorter one",

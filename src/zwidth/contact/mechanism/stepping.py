@@ -97,6 +97,7 @@ def balanced_norm(A: Floats, n: int) -> float:
         for j in range(N):
             if j < n:
                 to_places += abs(A[i, j])
+            # what couples lagged torques with rates comes below, since its two directions have different units
             elif i < 2 * n or j >= 2 * n:
                 to_rates += abs(A[i, j]) if (j < 2 * n or i >= 2 * n) else 0.0
         stiff, fast = max(stiff, to_places), max(fast, to_rates)

@@ -150,6 +150,7 @@ def _spring_numbers(plant: Plant, motor: Ints) -> tuple[Floats, Floats, Floats]:
     d = len(motor)
     cubic, excess, kink = np.zeros(d), np.zeros(d), np.zeros(d)
     for spring in plant.nonlinear.springs:
+        # along reads theta - phi: 1 at the drive's own motor
         i = int(np.flatnonzero(spring.along[motor] > 0.0)[0])
         cubic[i], excess[i], kink[i] = spring.cubic, spring.backward_excess, spring.kink
     return cubic, excess, kink
