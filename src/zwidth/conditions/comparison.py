@@ -200,6 +200,7 @@ def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
         return chart.stiffness_max
     crossings = _crossings(chart, wall_damping)
     width = max((float(np.max(np.abs(ring[:, 0]))) for ring in chart.regions), default=0.0)
+    # the stiffest first; a K that is 0 but for the rounding of the chart is no stiffness
     for stiffness in sorted((K for K in crossings if 1e-9 * width < K), reverse=True):
         refined = _refined_edge(chart, stiffness, wall_damping, width)
         if refined is not None:

@@ -79,7 +79,7 @@ class OneMode:
         # dampings c: 0; dk/dc = 0 on the pair's edge; the largest, |r c| = 1; the corner with the line of z = -1
         candidates = [0.0, *_roots(a2 * n, 2.0 * a2, a1 - n * a0)]
         if r != 0.0:
-            candidates.append((1.0 - 1e-12) / abs(r))
+            candidates.append((1.0 - 1e-12) / abs(r))  # just inside, since |r c| = 1 itself is not stable
         if 2.0 * n != g:
             flip = (4.0 - 2.0 * e + h) / (2.0 * n - g)  # k + 2 c on the line of z = -1
             candidates += _roots(a2 + 2.0 * r * n, a1 - r * (n * flip - 2.0), a0 - r * flip)

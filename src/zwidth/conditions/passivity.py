@@ -59,7 +59,7 @@ class PassiveSet:
         """
         if not self.device_damping > 0.0:
             return 0.0, 0.0
-        low, high = 0.0, self.device_damping / float(np.max(self.damper))
+        low, high = 0.0, self.device_damping / float(np.max(self.damper))  # beyond, B V alone is more than b
         for _ in range(80):
             left, right = low + (high - low) / 3.0, high - (high - low) / 3.0
             first, second = self.stiffness_limit(np.array([left, right]))
@@ -88,6 +88,7 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     d = 2.0 * sine * (1j * np.cos(t / 2.0) - sine)  # e^jt - 1 without cancellation
     force, estimator, z = force_filter(loop.controller), loop.estimator, 1.0 + d
     w = factor_response(estimator.numerator, estimator.denominator, d) * window_response(estimator.window, z)
+    # T (1 - e^-jt) e^-jlt F / (4 sin^2(t/2)), with 1 - e^-jt = d e^-jt
     delayed_force = (
         d
         * np.exp(-1j * (l + 1) * t)

@@ -50,7 +50,7 @@ def held_force_response(x: ArrayLike) -> HeldForceResponse:
     x = np.asarray(x, dtype=float)
     tiny = x < 1e-8
     safe = np.where(tiny, 1.0, x)
-    # 1 - E - x E = gammainc(2, x); for x -> 0 the limits (4.13), with their slope
+    # 1 - E - x E = gammainc(2, x), and n1 = (1 - E)/x - n0; for x -> 0 the limits (4.13), with their slope
     old = np.where(tiny, 0.5 - x / 3.0, gammainc(2.0, safe) / safe**2)
     new = np.where(tiny, 0.5 - x / 6.0, -np.expm1(-safe) / safe - gammainc(2.0, safe) / safe**2)
     # below x = 1 the root z = -1 is far from binding, and its formula cancels

@@ -138,7 +138,7 @@ def _is_uncoupled(plant: Plant, shapes: Floats, run: slice, push: Floats) -> boo
     motion = np.zeros(len(push))
     motion[run] = push[run]
     modal = shapes.T @ plant.damping @ shapes
-    force = modal @ motion
+    force = modal @ motion  # of the damping: it must be along the motion itself
     along = motion * (force @ motion) / (motion @ motion)
     scale = np.abs(modal) @ np.abs(motion)
     return bool(np.all(np.abs(force - along) <= 1e-9 * np.max(scale, initial=0.0)))

@@ -62,6 +62,7 @@ class CubicPieces:
     def through(cls, nodes: Floats, values: Complexes, signs: Floats) -> CubicPieces:
         """Cubics through values (m, n) at ascending nodes (n,); `signs` (m,) are -1 for odd functions."""
         window = np.arange(len(nodes) - 4)[:, None] + np.arange(5)
+        # distances of the five nodes of each window, 1 of each from itself, which the products are to pass over
         apart = nodes[window][:, :, None] - nodes[window][:, None, :] + np.eye(5)
         fifth = np.abs(np.sum(values[:, window] / np.prod(apart, axis=2), axis=2))
         # the largest of the windows that begin one to four nodes before an interval's left end
@@ -104,12 +105,12 @@ class Form:
     def at(cls, pieces: CubicPieces, angles: Floats) -> Form:
         """The numbers at angles (k,), of cubics through n0, Re n1, Im n1 and n2."""
         (n0, real, imag, n2), (e0, e_real, e_imag, e2) = pieces.at(angles)
-        low = np.maximum(n0.real, ROUNDING)
+        low = np.maximum(n0.real, ROUNDING)  # n0 is positive; by as much as it is raised, e0 is larger
         n1, size = real + 1j * imag, np.maximum(np.hypot(real.real, imag.real), 1e-300)
         along = (np.abs(real) * e_real + np.abs(imag) * e_imag) / size**2
         across = (np.abs(imag) * e_real + np.abs(real) * e_imag) / size
         # the form means the same times any number: an error along n1 becomes one of n0 and n2
-        turned = along < 0.5
+        turned = along < 0.5  # not where it is about as large as n1 itself: all of it stays with n1 then
         scaled = np.where(turned, along / np.where(turned, 1.0 - along, 1.0), 0.0)
         e1 = np.where(turned, across * (1.0 + scaled), np.hypot(e_real, e_imag)) + ROUNDING * size
         e0 = (e0 + low - n0.real) * (1.0 + scaled) + low * scaled
@@ -122,7 +123,11 @@ class Form:
 
     @cached_property
     def nearest(self) -> Floats:
-        """|p| (k,) of the point of each disk nearest to 0, or 1 where that is larger: where it has to be exact."""
+        """|p| (k,) at which each disk has to be exact: 1, where the walls -1/P have the size 1/s that matters, or
+        that of the disk's point nearest to 0, the stiffest wall it forbids, where all of it lies farther out.
+
+        The nearest point is at (|C| - R)/s = (|C|^2 - R^2)/(|C| + R)/s, negative where the disk holds 0.
+        """
         return np.maximum(self.n2 / (np.abs(self.n1) + self.radius + 1e-300), 1.0)
 
     def growth(self) -> Floats:
@@ -198,6 +203,7 @@ class DisksBetween:
         values, errors = self.centres.at(angles)
         C, error = _centre_and_error(values[kind], errors[kind], kind)
         (ratio,), (missed,) = self.ratio.at(angles)
+        # R/|C|, which the centre's error makes larger by 1 + R/|C| of it
         R = np.maximum(ratio.real, 0.0) + missed + (1.0 + np.abs(ratio)) * error
         return np.asarray(C), np.abs(C) ** 2 * (1.0 - R**2)
 

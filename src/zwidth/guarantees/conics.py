@@ -174,12 +174,14 @@ def panel_ends(loop: Loop, held_port: Port) -> Floats:
     poles = np.abs(held_port.poles) * loop.period
     lowest = min(LOWEST, BELOW * float(np.min(poles[poles > SLOWEST], initial=1.0)))
     centre, width, turns = _singularities(loop, held_port)
-    resolved = turns > 1e-3 * lowest
+    resolved = turns > 1e-3 * lowest  # singularities far below the lowest angle bend nothing
+    # no panel narrower than 1e-9 of a resonance's own angle, where rounding tells no more
     centre, width = centre[resolved], np.maximum(width, 1e-9 * turns)[resolved]
     steps = 2.0 ** np.arange(0, 31)
     across = width[:, None] * steps
     near = across < np.minimum(0.3, 0.5 * centre)[:, None]
     sides = [(centre[:, None] + way * across)[near] for way in (-1.0, 1.0)]
+    # octaves below 0.4 rad, and even steps above
     low = 0.4 * 2.0 ** -np.arange(0, np.ceil(np.log2(0.4 / lowest)))
     ends = np.concatenate([*sides, low, np.linspace(0.4, np.pi, 8)])
     ends = np.unique(ends[(ends > 1.2 * lowest) & (ends < np.pi * 0.999)])
@@ -215,7 +217,8 @@ def _functions_and_sizes(loop: Loop, aliases: Aliases, angles: Floats) -> Floats
     inf where a disk has an infinite radius.
     """
     disks, w, T = aliases.disks(angles), velocity_estimate(loop, angles), loop.period
-    # zeros of filters are exact to roundings of what the filters are given
+    # zeros of filters are exact to roundings of what the filters are given: sizes are those in front of them, that
+    # of w at least the plain difference's
     passed = np.maximum(np.abs(force_filter_response(loop, angles)), 1e-300)
     speed = np.maximum(np.abs(w), np.abs(one_less_z_inverse(angles)) / T)
     R2 = np.maximum(disks.radius, LEAST * np.abs(disks.centre)) ** 2
@@ -244,7 +247,8 @@ def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:
 
 
 def _resolved(values: Floats, rounding: Floats, degree: int) -> tuple[Flags, Flags]:
-    """Which panels (n,) of values (n, 10, POINTS) have wide disks, and which their polynomials represent exactly.
+    """Which panels (n,) of values (n, 10, POINTS) have wide disks, and which their polynomials represent exactly;
+    of wide ones only those in which no disk is below THIN.
 
     rounding  (n, 10) errors that are allowed
     degree    from which on nothing may be left
@@ -259,7 +263,8 @@ def _resolved(values: Floats, rounding: Floats, degree: int) -> tuple[Flags, Fla
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(radius > 0.0, radius / centre[:, 0], 0.0)
     wide = ratio.max(axis=-1) > WIDE
-    # of wide disks a and b count, of the others H C and H R
+    # of wide disks a and b count, each in shares of its own size; of the others H C, in shares of |C| and |w C|,
+    # and (H R)^2, in shares of |H|^2 R |C|, since mu has it as H R beside H C
     linear, across = centre.max(axis=-1), size[:, R_KK:] / np.maximum(ratio.max(axis=-1), 1e-9)[:, None]
     allowed = np.full_like(tail, np.inf)
     allowed[:, A_K:C_K] = np.where(wide[:, None], size[:, A_K:C_K], linear)

@@ -138,11 +138,12 @@ def coupling_region(demand: CouplingDemand, period: float) -> Region:
     def reach(direction: Floats) -> Floats:
         """Length (k,) of rays of couplings that meet the demand, in the plane of k_c T and b_c, at angles (k,)."""
         Z = coupling_impedance(np.cos(direction) / period, np.sin(direction), demand.angles, period)
-        # a negative k_c drifts away by itself
+        # Re(1/Z_c) = Re Z_c / |Z_c|^2
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(demand.conductance > 0.0, Z.real / np.abs(Z) ** 2 / demand.conductance, np.inf)
             return np.asarray(np.maximum(ratio.min(axis=-1), 0.0))
 
+    # only k_c >= 0: a negative k_c drifts away by itself
     direction = np.linspace(-np.pi / 2.0, np.pi / 2.0, DIRECTIONS)
     far = reach(direction)
     k, b = far * np.cos(direction) / period, far * np.sin(direction)
@@ -163,7 +164,7 @@ def _excludes_springs(demand: CouplingDemand) -> bool:
     of its lowest angle; they belong to the grid and not to the device.
     """
     angles, conductance = demand.angles, demand.conductance
-    n = int(np.searchsorted(angles, 2.0 * angles[0]))
+    n = int(np.searchsorted(angles, 2.0 * angles[0]))  # an octave above the lowest, to tell the power of growth
     return bool(conductance[0] > 0.0 and conductance[n] < conductance[0] * (angles[n] / angles[0]) ** LEAST_ORDER)
 
 
@@ -248,6 +249,7 @@ def angle_grid(loop: Loop, held: Floats) -> Floats:
     turn = np.mod(poles.imag, 2.0 * np.pi)
     centre = np.where(turn > np.pi, 2.0 * np.pi - turn, turn)
     width = np.maximum(-poles.real, 1e-9 * np.abs(poles.imag))
+    # well below the slowest resonance, but not where rounding hides the response
     lowest = min(LOWEST, 0.02 * float(np.min(np.abs(poles), initial=1.0)))
     lowest = max(lowest, 1e-6)
     across = (centre[:, None] + width[:, None] * ACROSS).ravel()

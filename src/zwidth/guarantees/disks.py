@@ -134,7 +134,8 @@ def _with_feedforward(
     d = np.exp(1j * theta) * one_less_z_inverse(theta)
     q = feedforward_response(ahead, loop.period, 1.0 + d, d)
     along, square = -np.real(centre * q), power * np.abs(q) ** 2
-    # 1/mu is the part of q at which it fails first, as for walls (`gauge`)
+    # 1/mu is the part of q at which it fails first, as for walls (`gauge`) with H = -q: it fails if that is at
+    # most the whole of q, and the discriminant |q|^2 r^2 - Im(c q)^2 is not negative
     root = np.sqrt(np.maximum(along**2 - square, 0.0))
     mu = np.where(along > 0.0, -square / np.maximum(along + root, 1e-300), root - along)
     fails = (np.abs(q) ** 2 * radius**2 >= np.imag(centre * q) ** 2) & ~(mu < 1.0)
@@ -180,6 +181,7 @@ def _alias_terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes
     coupling = response.port_to_reading * response.actuator_to_port
     weight = np.exp(-2j * np.pi * cycles * loop.fractional_delay) / T
     weight = weight / (1.0 + 1j * w * loop.controller.actuator_time_constant)
+    # the s of the swing, G_yh G_ha s/(2 Re Y), cancels that of the hold
     dead = ~(response.dissipation > 0.0) & (np.abs(coupling) > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         swing = np.where(np.abs(coupling) > 0.0, weight * coupling / (2.0 * response.dissipation), 0.0)
@@ -211,7 +213,7 @@ class Expansion:
 
 def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
     """The `Expansion` of aliases beyond number `far`, fitted at Chebyshev nodes in t = far / cycles."""
-    t = (1.05 + chebyshev.chebpts1(2 * TERMS)) / 2.05
+    t = (1.05 + chebyshev.chebpts1(2 * TERMS)) / 2.05  # from next to 0, where cycles are infinite, to 1
     cycles = far / t
     direct, swing = _alias_terms(loop, held_port, cycles)
     radius = np.abs(swing)
@@ -222,6 +224,7 @@ def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
     values = np.column_stack([upright, radius]) / (t * t)[:, None]
     powers = t[:, None] ** np.arange(TERMS)
     fit, *_ = np.linalg.lstsq(powers.astype(complex), values, rcond=None)
+    # the near alias by which the misfit is measured is at half the sampling rate; about `far` misfits add up
     direct, swing = _alias_terms(loop, held_port, np.array([0.5]))
     centre, radius = np.abs(direct - swing)[0], np.abs(swing)[0]
     near = np.maximum([centre, radius], SEEN * (centre + radius)) if centre + radius > 0.0 else np.ones(2)

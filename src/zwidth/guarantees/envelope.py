@@ -153,7 +153,7 @@ def envelope_between(
     if length < SHORT * size:
         return [(np.array([one.wall, other.wall])[:: _way(one, other)], one.share, other.share)]
     share = 0.5 * (one.share + other.share)
-    reach = 0.75 * abs(other.theta - one.theta) + 1e-9
+    reach = 0.75 * abs(other.theta - one.theta) + 1e-9  # half the way to either end, and half as much again
     middle = nearest_touching_point(springs, share, 0.5 * (one.theta + other.theta), reach)
     if middle is None:
         lost_shares.append(share)
@@ -323,6 +323,7 @@ def _strips_outside_envelope(
     length = float(np.hypot(*gap))
     if length == 0.0:
         return []
+    # how far off the chord the tangents lead over its length; the envelope between stays nearer
     aside = max(abs(end.tangent[0] * gap[1] - end.tangent[1] * gap[0]) for end in (one, other))
     wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
     strips = []

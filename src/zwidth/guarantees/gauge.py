@@ -113,6 +113,7 @@ def _conic_at(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[
 def _sag(x2: float, x3: float, x4: float, s: float, h: float) -> float:
     """Largest distance of a quartic below its chord from s - h/2 to s + h/2, by coefficients x2, x3, x4 of s^2 to
     s^4: h^2/8 of its largest second derivative there."""
+    # in the middle; within h/2 it changes by h/2 times the third derivative, at most 6 |x3| + 24 |x4| as s <= 1
     bend = 2.0 * x2 + 6.0 * x3 * s + 12.0 * x4 * s * s
     sag: float = max(bend + 0.5 * h * (abs(6.0 * x3) + abs(24.0 * x4)), 0.0) * h * h / 8.0
     return sag

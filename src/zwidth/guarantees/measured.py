@@ -97,7 +97,7 @@ def _alias_sums(port: MeasuredPort) -> tuple[Complexes, Floats]:
             q = np.where(taken > 0.0, pushed / (2.0 * np.where(taken > 0.0, taken, 1.0)), np.inf)
             total, size = total + q, size + np.abs(q)
             if k == FAR:
-                size = size + np.abs(q) * FAR  # terms fall like 1/k^2
+                size = size + np.abs(q) * FAR  # terms fall like 1/k^2: those beyond sum to FAR times the last
     if not np.all(np.isfinite(size)):
         return near[0], np.full(len(port.theta), np.inf)
     factor = port.model.hold(theta) * theta
@@ -109,7 +109,8 @@ def _alias_sums(port: MeasuredPort) -> tuple[Complexes, Floats]:
 
 
 def _softest_spring(disks: Disks) -> float:
-    """1/K [m/N] of the softest spring that fails at a measured angle; where none fails, the size of the disks."""
+    """1/K [m/N] of the softest spring that fails at a measured angle, the largest mu (see `gauge`) of the wall
+    K = 1, B = 0; where none fails, the size of the disks."""
     across = disks.radius**2 - disks.centre.imag**2
     mu = np.where(across >= 0.0, np.sqrt(np.maximum(across, 0.0)) - disks.centre.real, 0.0)
     largest = float(np.max(mu))

@@ -72,6 +72,7 @@ class Port:
         zeros, scale = scipy.linalg.eigvals(
             pencil, np.diag(np.append(np.ones(2 * N), 0.0)), homogeneous_eigvals=True
         )
+        # c = b^T above, since the port's velocity is read where its force acts
         finite = np.abs(scale) > 0.0
         return np.asarray(zeros[finite] / scale[finite], dtype=complex)
 
@@ -187,7 +188,7 @@ def _static_compliance(plant: Plant) -> float:
     share = push * read
     rigid = squared == 0.0
     free = float(np.sum(share[rigid]))
-    if abs(free) > 1e-12 * float(np.sum(np.abs(share))):
+    if abs(free) > 1e-12 * float(np.sum(np.abs(share))):  # by more than rounding
         return float(np.copysign(np.inf, free))
     return float(np.sum(share[~rigid] / squared[~rigid]))
 

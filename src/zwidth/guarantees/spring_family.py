@@ -71,7 +71,8 @@ class SpringFamily:
 
     @classmethod
     def of(cls, loop: Loop) -> SpringFamily:
-        """The springs of a loop whose plant has a handle."""
+        """The springs of a loop whose plant has a handle; the reference is the median of those that put a mode at
+        frequencies around Nyquist's, since for a single one there may be none."""
         w = np.pi / loop.period * np.linspace(0.5, 1.5, 11)
         k = np.abs(spring_for(loop.plant, w))
         return cls(loop, float(np.median(k[np.isfinite(k) & (k > 0.0)])))

@@ -80,7 +80,8 @@ def nyquist_region(loop: Loop) -> Region:
     share, *beside = springs.shares(k * np.array([1.0, 0.9, 1.1])).tolist()
     # size of the open loop's characteristic polynomial at z = -1, with the Nyquist spring and one to either side
     poles = [abs(float(t.line("minus")[0])) for one in (share, *beside) if (t := springs.tracer(one)) is not None]
-    if poles and poles[0] < DOUBLE**2 * max(poles):  # a double root at -1 that takes long to chart
+    # a double root at -1 that takes long to chart: the polynomial there is as the square of the root's distance
+    if poles and poles[0] < DOUBLE**2 * max(poles):
         return empty_region(UNDAMPED)
     member = springs.member(share)
     rings = () if member is None else polygon_rings(member_polygons(member, springs.unit))
@@ -309,6 +310,7 @@ def _springs_of_one_alias(springs: SpringFamily) -> Floats:
     Such modes, though far apart, exchange their damping: within a narrow band of springs one of them may lose it.
     """
     plant, T = springs.loop.plant, springs.loop.period
+    # of two frequencies, since one may be of a mode of the free device, which takes no spring
     top = np.max(np.abs(spring_for(plant, np.pi / T * np.array([FARTHEST, FARTHEST + 0.1]))))
     if not 0.0 < top < np.inf:
         return np.zeros(0)
@@ -316,8 +318,10 @@ def _springs_of_one_alias(springs: SpringFamily) -> Floats:
     root = np.linalg.inv(np.linalg.cholesky(plant.mass))
     handle = root @ spring_handle(plant)
     squared = np.linalg.eigvalsh(root @ plant.stiffness @ root.T + k[:, None, None] * np.outer(handle, handle))
+    # angles w T of the modes (springs, modes), folded into [0, pi]; two meet where their difference changes sign
     alias = np.abs((np.sqrt(np.maximum(squared, 0.0)) * T + np.pi) % (2.0 * np.pi) - np.pi)
     first, second = np.triu_indices(alias.shape[1], 1)
     apart = alias[:, first] - alias[:, second]
     at, _ = np.nonzero(apart[1:] * apart[:-1] < 0.0)
+    # a spring is as the square of its mode's frequency, of which BESIDE are shares
     return springs.shares(np.unique(k[at, None] * (1.0 + 2.0 * BESIDE)))

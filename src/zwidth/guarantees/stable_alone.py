@@ -116,10 +116,11 @@ def _by_roots(loop: Loop) -> Premise:
     d, error = _eigenvalues(form.growth)
     neutral = zero_poles(states, loop.controller)
     d[np.argsort(np.abs(d))[:neutral]] = 0.0
-    excess = d.real + 0.5 * np.abs(d) ** 2  # |z| - 1 without cancellation
+    excess = d.real + 0.5 * np.abs(d) ** 2  # (|z|^2 - 1)/2, next to the circle |z| - 1, without cancellation
     rate = max(float(np.max(np.log1p(2.0 * np.maximum(excess, 0.0)))) / (2.0 * period), hidden)
     if np.any(excess > np.maximum(BAND, error)) or hidden > SIGN / period:
         return _premise(False, rate)
+    # a slow root that decays without vibration, excess = -|d|, is told from the circle however near to z = 1 it is
     near = (excess > -np.minimum(np.maximum(BAND, error), 0.5 * np.abs(d))) & (d != 0.0)
     return _premise(None if np.any(near) else True)
 

@@ -52,9 +52,9 @@ class CouplingDemand:
 
 def coupling_impedance(stiffness: ArrayLike, damping: ArrayLike, angles: Floats, period: float) -> Complexes:
     """Z_c = b_c + k_c T z/(z - 1) = b_c + k_c T/2 - j (k_c T/2) cot(theta/2), of couplings (...): (..., k)."""
-    q = np.asarray(stiffness, dtype=float)[..., None] * period / 2.0
+    half = np.asarray(stiffness, dtype=float)[..., None] * period / 2.0  # k_c T/2
     b = np.asarray(damping, dtype=float)[..., None]
-    return np.asarray(b + q - 1j * q / np.tan(np.asarray(angles) / 2.0), dtype=complex)
+    return np.asarray(b + half - 1j * half / np.tan(np.asarray(angles) / 2.0), dtype=complex)
 
 
 def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
@@ -62,7 +62,7 @@ def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, 
     w = 2.0 / loop.period * np.tan(angles / 2.0)
     s = 1j * w
     G = port_response(port(loop.plant, held), w)
-    hold = np.cos(angles / 2.0) * np.exp(-0.5j * angles)
+    hold = np.cos(angles / 2.0) * np.exp(-0.5j * angles)  # (z + 1)/(2 z)
     lag = 1.0 + s * loop.controller.actuator_time_constant
     D = hold * np.exp(-1j * angles * loop.controller.delay) * force_filter_response(loop, angles) / lag
     # Re h11 from the dissipation: no digits lost against the mass
@@ -97,6 +97,7 @@ def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand:
 def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand:
     """Stability with any passive operator and environment of the sampled device, velocity by (z - 1)/(T z)."""
     disks = response_disks(loop, port(loop.plant, held), angles)
+    # 1 - 1/z over T, of admittances from responses
     difference = 2j * np.sin(angles / 2.0) * np.exp(-0.5j * angles) / loop.period
     centre, radius = disks.centre * difference, disks.radius * np.abs(difference)
     return CouplingDemand(angles, centre, radius, disks.power * np.abs(difference) ** 2, radius - centre.real)

@@ -481,10 +481,10 @@ def _section_and_factors(form: PoleZeroForm, delay: int) -> tuple[Floats, Filter
     single = zeros[-1:].real if len(zeros) % 2 else zeros[:0].real
     above = _quadratics(zeros[: len(zeros) - len(single)])
     slowest = below.pop(int(np.argmin([abs(c0) for _, _, c0 in below])))
-    top = [1.0, -single[0]] if len(single) else [0.0, 1.0]
+    top = [1.0, -single[0]] if len(single) else [0.0, 1.0]  # coefficients of d and 1: d - zero, or 1
     # d1, d0, n2 = 0, n1, n0, no old force, not chained
     row = np.array([*slowest[1:], 0.0, form.gain * top[0], form.gain * top[1], 0.0, 0.0, 0.0, 0.0])
-    # each pair of zeros with the pair of poles whose size is nearest in order
+    # each pair of zeros with the pair of poles of the same rank in size, |c0|: no factor is very large or small
     below.sort(key=lambda quadratic: -abs(quadratic[2]))
     above.sort(key=lambda quadratic: -abs(quadratic[2]))
     above += [[0.0, 0.0, 1.0]] * (len(below) - len(above))

@@ -104,9 +104,9 @@ def refined_root(p: Polynomial, start: complex) -> tuple[Decimal, Decimal] | Non
             step_x, step_y = (re * slope_re + im * slope_im) / size, (im * slope_re - re * slope_im) / size
             x, y = x - step_x, y - step_y
             length, place = max(abs(step_x), abs(step_y)), max(abs(x), abs(y))
-            if length <= Decimal("1e-60") * place:
+            if length <= Decimal("1e-60") * place:  # the next step would be its square
                 return x, y
-            if length > place:
+            if length > place:  # it leaves for another root
                 return None
     return None
 

@@ -30,13 +30,14 @@ def step_response(decay: float, squared: float, time: float) -> tuple[float, flo
     with s1, s2 the roots of s^2 + 2 a s + w^2. Near 0 the power series of the divided difference is summed, which
     covers rigid, undamped and critically damped modes without cases; elsewhere the closed forms hold.
     """
+    # of s1 t and s2 t: their sum, product and mean, and minus the square of half their difference
     total, product = -2.0 * decay * time, squared * time * time
     mean, gap = -decay * time, (squared - decay * decay) * time * time
     if gap > 0.0:
         velocity = exp(mean) * (sin(sqrt(gap)) / sqrt(gap))
     elif gap < 0.0:
         root = sqrt(-gap)
-        # exp(mean) sinh(root) would overflow for strong damping
+        # exp(mean) sinh(root) would overflow for strong damping; the difference would cancel for small roots
         velocity = (
             (exp(mean + root) - exp(mean - root)) / (2.0 * root) if root > 1.0 else (exp(mean) * sinh(root) / root)
         )
@@ -125,6 +126,7 @@ def _numerator(decay: float, squared: float, step: Pair, response: Pair, positio
               Phi_12 = g', and by the mode's own equation 1 - Phi_22 = 2 a g' + w^2 g, Phi_21 = -w^2 g'
     response  V
     """
+    # adj(d - E) = [d + back, g'; -w^2 g', d + w^2 g]
     g, dg = step
     x, v = response
     back = 2.0 * decay * dg + squared * g
@@ -146,7 +148,8 @@ def lagged_row(
         (d + s) y = c Q + c (d - E)^-1 [ s P + (s + E) Q ]
     """
     d1, d0 = denominator(decay, squared, period)
-    if lag == 0.0:  # s = 1, beside modes of other computers whose forces lag
+    # without lag, beside computers whose forces lag, s = 1: times d + 1, which the factor 1/(d + 1) takes back
+    if lag == 0.0:
         row = held_row(decay, squared, position, velocity, period, fraction)
         n1, n0, o1, o0 = row[3], row[4], row[6], row[7]
         return d1, d0, n1, n1 + n0, n0, o1, o1 + o0, o0
@@ -208,7 +211,8 @@ def lagged_responses(decay: float, squared: float, time: float, lag: float) -> t
     # X by column, of the force (f), the command (c) and the mode's own two states (x, v): xf is row x of column f
     xf, vf, ff, xc, vc, fc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, vx, xv, vv = 0.0, 0.0, 0.0, 0.0
-    for k in range(16, 0, -1):  # Horner's rule for 1 + M/1 (1 + M/2 (1 + ...)), less the first 1
+    # Horner's rule for 1 + M/1 (1 + M/2 (1 + ...)), less the first 1; at a size of 0.5 sixteen terms are exact
+    for k in range(16, 0, -1):
         s = part / k
         xf, vf, ff = s * vf, s * (-w * xf - a * vf + 1.0 + ff), -s * rate * (1.0 + ff)
         xc, vc, fc = s * vc, s * (-w * xc - a * vc + fc), s * rate * (1.0 - fc)

@@ -233,8 +233,8 @@ class Loop:
 
     @cached_property
     def state_space(self) -> StateSpace:
-        """The loop's transition matrix as L0 + K LK + B LB."""
-        if self.closed is not None:
+        """The loop's states: its transition matrix is linear in K and B, `StateSpace.transition_matrix`."""
+        if self.closed is not None:  # its states hold the delays, the filters and the lag already
             return realise(self.sections, 0, False, NO_FILTER, self.estimator)
         return realise(self.sections, *self.path_delay, self.force_path, self.estimator)
 
@@ -282,6 +282,7 @@ def unobserved_instability(loop: Loop) -> bool:
     if not loop.unobserved_modes:
         return False
     if loop.closed is not None:
+        # |z|^2 - 1 of motions with these growth rates
         return bool(np.any(np.exp(2.0 * loop.closed.hidden * loop.period) - 1.0 > GROWS))
     observed_poles = _section_poles(loop.sections.rows[:, :2])
     return _unstable_count(_poles(loop.plant, loop.period)) > _unstable_count(observed_poles)
@@ -348,7 +349,8 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
     d[np.argsort(np.abs(d))[: states.neutral]] = 0.0  # several at once, rounding makes a slow vibration of them
     # |1 + d|^2 - 1 without cancellation
     excess = 2.0 * d.real + np.abs(d) ** 2
-    order = np.argsort(-excess)[: 2 * plant.size]
+    order = np.argsort(-excess)[: 2 * plant.size]  # two roots of each coordinate; the others are of commands
+    # ln |1 + d| / T; a root at z = 0 exactly would have no logarithm
     rates = 0.5 * np.log1p(np.maximum(excess[order], np.nextafter(-1.0, 0.0))) / controller.sampling_period
     rates[np.abs(excess[order]) < NEUTRAL] = 0.0
     frequencies = np.abs(np.angle(1.0 + d[order])) / (2.0 * pi * controller.sampling_period)

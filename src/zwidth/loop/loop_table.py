@@ -370,7 +370,7 @@ def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
         bilinear(loops.rows[i, k, 2], loops.rows[i, k, 3], loops.rows[i, k, 4], 2, radius, out.plant[k, 3:6])
         bilinear(loops.rows[i, k, 5], loops.rows[i, k, 6], loops.rows[i, k, 7], 2, radius, out.plant[k, 6:9])
         out.plant[k, 9] = loops.rows[i, k, 8]
-    # sections have two poles each; the delay, its split and the window add theirs at z = 0
+    # sections have two poles each; the delay, its split and the window's past samples add theirs at z = 0
     degree = 2 * m + out.sizes[WHOLE_DELAY] + out.sizes[SPLIT] + out.sizes[WINDOW] - 1
     for k in range(out.sizes[FORCE]):
         degree += int(out.force[k, 0])  # the factor's order
@@ -477,7 +477,8 @@ def minus_inverse_plant(
     those of `CircleFactors`; cc, ss, sc of `half_angle`.
     """
     top, bottom, dtop, dbottom = 0.0 + 0.0j, 1.0 + 0.0j, 0.0 + 0.0j, 0.0 + 0.0j
-    # denominators of the sections that a chain is not divided by, times (1 - s)^2 for each that it is
+    # denominators of the sections that a chain is not divided by, times (1 - s)^2 for each that it is: on the
+    # circle and times cos^2(theta/2) that is conj(u)
     beside, dbeside = 1.0 + 0.0j, 0.0 + 0.0j
     u = complex(cc - ss, 2.0 * sc)  # exp(i theta), whose slope is i u
     plant, split, delay = factors.plant, factors.sizes[SPLIT], factors.sizes[WHOLE_DELAY]
@@ -487,7 +488,7 @@ def minus_inverse_plant(
         if split:
             old, dold = quadratic(plant[k, 6], plant[k, 7], plant[k, 8], cc, ss, sc)
             back = scaled_factors(u.conjugate(), 1.0 / factors.radius[0])
-            num, dnum = num + old * back, dnum + (dold - turned(old)) * back
+            num, dnum = num + old * back, dnum + (dold - turned(old)) * back  # back = 1/z has the slope -i/z
         if plant[k, 9] != 0.0:
             dbeside = (dbeside - turned(beside)) * u.conjugate()
             beside = beside * u.conjugate()

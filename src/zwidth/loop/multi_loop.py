@@ -219,7 +219,8 @@ class MultiLoop:
         """P^-1 [N/m] and its derivative by z, (..., r, r), at z with d = z - 1, without forming P: near z = 1 the
         1/d^2 of a free motion hides the others in rounding.
 
-        The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y], G = new + old/z. The slope
+        The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y], with A the step, C the
+        reading and G = new + old/z of `sampled_plant`; delay and filter F multiply them by z^l/F. The slope
         follows from the same equations, differentiated by z.
 
         Raises LinAlgError where the readings are not independent.
@@ -253,6 +254,7 @@ class MultiLoop:
         sprung = self.principal.stiffness > 0.0
         if sprung.all():
             return open_, enters, position, velocity
+        # motions that L leaves as they are and neither reading shows, in shares of the readings' largest entries
         readings = [rows / np.abs(rows).max(initial=np.finfo(float).tiny) for rows in (position[sprung], velocity)]
         _, size, axes = np.linalg.svd(np.vstack([open_ - np.eye(len(open_)), *readings]))
         return _without_motions((open_, enters, position, velocity), axes[size <= UNSEEN].T)
@@ -266,7 +268,7 @@ class MultiLoop:
         sizes = np.cumsum([0, len(held.step), m * queue, m * len(w.A), m * len(F.A)])
         # places of the states: plant x, forces that wait q, velocity estimates e, force filters f
         x, q, e, f = (slice(a, b) for a, b in pairwise(sizes))
-        N, one = int(sizes[-1]), np.eye(m)
+        N, one = int(sizes[-1]), np.eye(m)  # kron(.., one): the same filter for each of the m directions
         states = np.eye(N)
         position = held.reading @ states[x]
         velocity = w.direct * position + np.kron(w.output[None], one) @ states[e]
@@ -281,7 +283,7 @@ class MultiLoop:
         # late[k] is the command k samples old; unless a part of a sample splits the hold there is none of l + 1
         for gain, at in ((held.new, l), (held.old, l + 1)):
             if at < len(late):
-                open_[x] += gain @ late[at]
+                open_[x] += gain @ late[at]  # without delay the wall's force acts at once, too
                 enters[x] += gain * F.direct * (at == 0)
         if queue:
             open_[q] = np.vstack(late[:-1])
@@ -308,9 +310,9 @@ def _without_motions(
     """A system, the four matrices of `MultiLoop.affine`, without motions (N, d) that stay as they are and that
     nothing reads.
 
-    One state each is left out, and what it says of its motion is taken off the others: x_i - x_p n_i / n_p. An
-    orthogonal basis of the other motions would mix forces with positions, 1e8 times smaller, and no scaling of
-    states could bring back the digits that roots lose by it.
+    One state x_p is left out for each motion n, and what it says of it is taken off the others:
+    x_i - x_p n_i / n_p. An orthogonal basis of the other motions would mix forces with positions, 1e8 times
+    smaller, and no scaling of states could bring back the digits that roots lose by it.
     """
     from scipy.linalg import qr
 
@@ -368,7 +370,7 @@ def _unheld_of_one(loop: Loop) -> int:
         return 0
     if loop.closed is not None or loop.sections.sampled_form is not None:
         return 1
-    # motions of different damping have a row each
+    # motions of different damping have a row each, d0 = 0 for the pole at z = 1
     return max(1, int(np.count_nonzero(loop.sections.rows[:, 1] == 0.0)))
 
 
@@ -430,6 +432,7 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
     level = max(float(np.max(np.abs(damping))), np.finfo(float).tiny)  # of which shares are rounding
     damping[np.abs(damping) <= 1e-14 * level] = 0.0
     inputs, outputs = shapes.T @ plant.actuators.T, plant.sensors @ shapes
+    # the largest residue that all modes together could have
     total = float(np.linalg.norm(inputs, axis=1).sum() * np.linalg.norm(outputs, axis=0).sum())
     coupled = np.abs(damping - np.diag(np.diag(damping))) > REPEATED * level
     from scipy.sparse.csgraph import connected_components  # imported here: it takes 0.2 s
@@ -485,7 +488,7 @@ def _mode_states(
     """
     k = len(squared)
     rate = np.maximum(np.sqrt(np.abs(squared)), np.abs(np.diag(damping)))
-    rate[rate == 0.0] = 1.0 / period
+    rate[rate == 0.0] = 1.0 / period  # a free mass has no rate of its own
     A = np.block(
         [[np.zeros((k, k)), np.diag(rate)], [-np.diag(squared / rate), -damping * (rate / rate[:, None])]]
     )
@@ -505,7 +508,7 @@ def _equal_poles(
     """
     period, decay = sampling[0], drag / 2.0
     left, strength, right = np.linalg.svd(outputs @ inputs)
-    level = total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
+    level = total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)  # 1e-9: no damping
     rank = int(np.sum(strength[: len(inputs)] * _reach(squared, drag, *sampling) > level))
     root = np.sqrt(strength[:rank])
     enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root
@@ -535,6 +538,7 @@ def _coupled_modes(
         return whole
     source = np.linalg.solve(right, whole.B.astype(complex))
     readings = whole.C @ right
+    # size of (exp(s T) - 1)/s, by which a force held for T moves a pole's state; T where s is 0
     reach = np.abs(np.expm1(poles * period) / np.where(poles == 0.0, 1.0, poles)) + period * (poles == 0.0)
     strength = np.linalg.norm(source, axis=1) * np.linalg.norm(readings, axis=0) * reach
     keep = strength > UNOBSERVED * float(np.sum(strength))

@@ -142,7 +142,8 @@ def _modal_states(modes: RealModes, period: float, rows: Floats) -> PlantStates:
     a, squared, T = modes.decay, modes.frequency_squared, period
     # per place and velocity (2, n), the acceleration being -2 a velocity - squared place
     force = np.array([rows[2] - squared * rows[0], rows[1] - 2.0 * a * rows[0]])
-    # the force per force counts itself: a feedback moves poles by what it reads of them
+    # what a mode may show unseen: of the reading a share of all modes together; of the force the number of force
+    # per force itself, since a feedback moves poles by what it reads of them (without damping SECOND_UNREAD)
     together = np.abs(modes.input).sum() * np.abs(modes.output).sum()
     reach = np.array([together * T**2, SECOND_UNREAD / UNOBSERVED_UNDAMPED])
     kept, hidden, names = [], list[float](), list[str]()
@@ -152,7 +153,7 @@ def _modal_states(modes: RealModes, period: float, rows: Floats) -> PlantStates:
         place, velocity = force[:, group] @ modes.input[group]
         # a mode at a multiple of the sampling rate is not reached by a hold
         held = float(np.max(np.abs(modal_row(a[one], squared[one], T)[2:]))) / T**2
-        level = UNOBSERVED_UNDAMPED if abs(a[one]) * T < 1e-9 else UNOBSERVED
+        level = UNOBSERVED_UNDAMPED if abs(a[one]) * T < 1e-9 else UNOBSERVED  # 1e-9: no damping
         sizes = np.array([abs(y) * T**2, abs(place) * T**2 + abs(velocity) * T])
         shown = bool(np.any(held * sizes > level * reach))
         hidden += [_growth_rate(float(a[one]), float(squared[one]))] * (len(group) - shown)
@@ -167,6 +168,7 @@ def _coupled_states(plant: Plant, period: float, force_rows: Floats | None) -> P
     """States of a plant whose dampers couple its modes or lag: those of its first-order form, and the free motion
     that is kept beside it. force_rows: `plant_states`."""
     form = first_order_form(plant, period, np.zeros((3, plant.size)) if force_rows is None else force_rows)
+    # its place and speed show in no force; its acceleration is in second_direct
     free = [Mode(0.0, 0.0, 1.0 / period, form.free_residue, np.zeros(2))] if form.free_residue else []
     names = [motion_name(0.0, 0.0)] * (form.free_count - len(free))
     names += [pole_name(pole) for pole in form.hidden_poles if pole.imag >= 0.0]

@@ -74,6 +74,8 @@ def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag:
         (d + s) y = output Q + output (d - E)^-1 [ s_in P + (s + E) Q ]
 
     s, s_in  `lag_share` of the period, and of the time for which the command of Q acts
+
+    The new command acts for the rest of the period, 1 - f; what that lacks of a whole one is the old command's.
     """
     T, rest = period, (1.0 - fraction) * period
     E, P, Q = step_growth(form, T, lag)
@@ -87,9 +89,11 @@ def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag:
 
 
 def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floats:
-    """The chain as rows (m, 8), each but the first divided by the denominators of those before it too.
+    """The chain as rows (m, 8) of `loop.hold`, each but the first divided by the denominators of those before it
+    too.
 
-    With the quadratics D_i in d whose roots are two of the sampled poles each
+    With E the growth, c the output, G the states that a new or an old force adds, and the quadratics
+    D_i = d^2 + d1_i d + d0_i whose roots are two of the sampled poles each
 
         c (d - E)^-1 G = sum_i [ c G_i d + c (E + d1_i) G_i ] / (D_1 ... D_i),     G_1 = G,  G_{i+1} = D_i(E) G_i
 
@@ -114,7 +118,7 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
         if len(pair) == 1:  # joined by a pole at z = 0, which no wall moves
             d1, d0 = d1 + 1.0, d1
         row = [d1, d0]
-        for direct, G in parts:
+        for direct, G in parts:  # the direct part over the same denominator: direct (d^2 + d1 d + d0)
             row += [direct, float(c @ G) + direct * d1, float(c @ (E @ G + d1 * G)) + direct * d0]
         rows.append(row)
         parts = [(0.0, E @ (E @ G + d1 * G) + d0 * G) for _, G in parts]
@@ -139,6 +143,7 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
         ]
         rows = []
         for pair in _pairs(form.poles, period):
+            # a pole at 0 is exact already, and Newton's method would not settle in shares of it
             roots = [
                 refined_root(below, complex(e)) if e else (Decimal(0),) * 2 for e in sampled_poles(pair, period)
             ]
@@ -195,8 +200,10 @@ def rows_error(rows: Floats, sampled: SampledForm) -> float:
     """How far the response of rows (m, 9) is from that of the states on the unit circle, in shares of it; 0
     without states.
 
-    Both are compared at ROW_PROBES angles, each in shares of the largest response at three neighbouring ones:
-    about a zero of the response rounding is any share of it.
+    Both are compared at ROW_PROBES angles, the last short of pi, where a response may be 0, each in shares of the
+    largest response at three neighbouring ones: about a zero of the response rounding is any share of it.
+
+    rows  columns of `loop.sections.Sections.rows`
     """
     k = len(sampled.output)
     if not k:
@@ -260,7 +267,7 @@ def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> t
 
 def _pairs(poles: Complexes, period: float) -> list[Complexes]:
     """Poles [1/s] two by two, fast ones first: conjugates together, a real one with its neighbour unless that is
-    much faster; an array of one pole then."""
+    much faster than it, and faster than EQUALLY_SLOW allows by as much; an array of one pole then."""
     pairs = [np.array([value, value.conjugate()]) for value in poles[poles.imag > 0.0]]
     real = list(poles[poles.imag == 0.0][np.argsort(np.abs(poles[poles.imag == 0.0]))])
     while real:
@@ -273,7 +280,8 @@ def _pairs(poles: Complexes, period: float) -> list[Complexes]:
 
 
 def sampled_poles(poles: Complexes, period: float) -> Complexes:
-    """exp(s T) - 1 of poles s (k,) [1/s], without cancellation near 0."""
+    """exp(s T) - 1 of poles s (k,) [1/s], without cancellation near 0: with s T = x + i y its real part is
+    (e^x - 1) cos y - 2 sin^2(y/2)."""
     x = poles * period
     real = np.expm1(x.real) * np.cos(x.imag) - 2.0 * np.sin(x.imag / 2.0) ** 2
     return real + 1j * np.exp(x.real) * np.sin(x.imag)
@@ -364,7 +372,8 @@ class _Match:
     def __init__(self, system: _Balanced, d: Complexes, zero_poles: int) -> None:
         """Keep the system's response at d = z - 1 (k,); `allowed` (k,), the size of an error that counts as 1, and
         `relevant` (k,), whether walls there can be edges. The response P counts as P d^2, which is constant for a
-        free mass."""
+        free mass. An error of the response's own size counts as 1; more is allowed where the response is
+        irrelevant, and below SLOW, where the system's own response is wrong by zeros of rounding."""
         self.d, self.wanted = d, system.response(d)
         size = np.abs(self.wanted * d**2)
         slow = np.minimum(np.abs(d) / SLOW, 1.0) ** zero_poles
@@ -459,13 +468,14 @@ class _Balanced:
         n = len(self.g)
         pencil, unit = np.zeros((n + 1, n + 1)), np.diag(np.append(np.ones(n), 0.0))
         pencil[:n, :n] = self.E
+        # g and c divided by their size, which moves no zero
         pencil[:n, n], pencil[n, :n] = self.g / np.max(np.abs(self.g)), self.c / np.max(np.abs(self.c))
         value, scale = eigvals(pencil, unit, homogeneous_eigvals=True)
         count = n - self._relative_degree()
         finite = np.abs(value) < INFINITE * np.abs(scale)
         zeros = np.asarray(value[finite] / scale[finite], dtype=np.complex128)
         zeros = zeros[np.argsort(np.abs(zeros))[:count]]
-        # the pencil takes far ones for infinite
+        # the pencil takes far ones for infinite: unlike places far out, from which `_improved` looks for them
         return np.append(zeros, FAR_ZERO * np.arange(1, count - len(zeros) + 1))
 
     def _relative_degree(self) -> int:
@@ -474,12 +484,13 @@ class _Balanced:
         for degree in range(1, len(self.g)):
             if self.c @ moved != 0.0:
                 return degree
-            moved = moved + self.E @ moved
+            moved = moved + self.E @ moved  # the states a sample later
         return len(self.g)
 
 
 def _probes(poles: Complexes) -> Complexes:
-    """Probes d = z - 1 (k,) at angles of the circle, from below the slowest pole up."""
+    """Probes d = z - 1 (k,) at angles of the circle, from below the slowest pole, LOWEST_PROBE at most and a
+    thousandth of it at least, to just short of pi, where responses may be 0."""
     moving = np.abs(poles[poles != 0.0])
     least = min(LOWEST_PROBE, max(0.3 * float(np.min(moving, initial=1.0)), 1e-3 * LOWEST_PROBE))
     angles = np.geomspace(least, 0.999 * np.pi, PROBES)
@@ -508,7 +519,7 @@ def _improved(
             near = np.min(np.abs(apart), axis=1)
             if poles is not None:
                 near = np.minimum(near, np.min(np.abs(at[:, None] - poles), axis=1))
-            step = 1.0 / (slope - np.sum(1.0 / apart, axis=1))
+            step = 1.0 / (slope - np.sum(1.0 / apart, axis=1))  # Newton's, the other roots divided out
             moved = movable & np.isfinite(step) & (np.abs(step) < longest * near)
         step = np.where(moved, step, 0.0)
         at = at - step
@@ -529,6 +540,7 @@ def _slope(system: _Balanced, at: Complexes, n: int, of_zeros: bool) -> Complexe
         return np.concatenate([_slope(system, at[k : k + 1], n, of_zeros) for k in range(len(at))])
     out = np.trace(inverse, axis1=-2, axis2=-1)
     if of_zeros:
+        # of c (d - E)^-1 g, whose derivative is -c (d - E)^-2 g, times det(d - E)
         states = inverse @ system.g
         out = out - np.einsum("kij,kj->ki", inverse, states) @ system.c / (states @ system.c)
     return np.asarray(out)

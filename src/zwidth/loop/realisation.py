@@ -177,6 +177,7 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
         space.open[..., at, at], t = pole_pair(d1, d0)
         for signal, (c2, c1, c0) in ((new, (n2, n1, n0)), (old, (o2, o1, o0))):
             if signal is not None:
+                # c2 passes the force on at once, the rest of the division goes through the states
                 signal.drive(at, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
                 reading += c2[..., None] * signal.states
         if np.any(chained):

@@ -24,7 +24,8 @@ from zwidth.model.plant_modes import fill_modes
 from zwidth.model.rendered_modes import PolePairs
 from zwidth.resources import in_chunks
 
-# Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
+# Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart; a row
+# with such poles whose response is below the same share of the earlier row's is what that rounding left.
 SAME_POLES = 1e-6
 # A chain that misses the response by more than the first is written again in decimal arithmetic: a root on the
 # unit circle, which moves by about as much, would else be off it by what eigenvalues see (1e-9). By more than the
@@ -76,7 +77,8 @@ def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float
         decay, squared = float(modes.decay[group[0]]), float(modes.frequency_squared[group[0]])
         row = modal_row(decay, squared, period, fraction, lag)
         row[2:] *= float(np.sum(residue[group]))
-        # What counts is the sampled residue: a mode at a multiple of the sampling rate is not reached by a hold
+        # What counts is the sampled residue: a mode at a multiple of the sampling rate is not reached by a hold. A
+        # decay below 1e-9 per sample is none
         level = total * period**2 * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
         observed = bool(np.max(np.abs(row[2:])) > level)
         unobserved += [motion_name(squared, decay)] * (len(group) - observed)
@@ -142,10 +144,14 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
 
 def _repeats(row: Floats, earlier: Floats) -> bool:
     """Whether a chain's row (8,) has the poles of an earlier one, (k, 8), and adds nothing to it: two equal
-    motions, of which force and sensor see but one."""
+    motions, of which force and sensor see but one.
+
+    A row is divided by the earlier one's denominator and its own. That, d^2 + d1 d + d0, is of the size rate^2 at
+    |d| = rate, the size of its poles; so its numerators are compared with rate^2 times the earlier one's.
+    """
 
     def size(other: Floats) -> float:
-        """Size of a row's numerators at |d| of the pole `rate`."""
+        """Size of a row's numerators at |d| = rate."""
         n2, n1, n0 = np.max(np.abs(other[2:].reshape(2, 3)), axis=0)
         return float((n2 * rate + n1) * rate + n0)
 
@@ -233,7 +239,8 @@ def fill_rows(
             else:
                 row = held_row(decay[i, k], squared[i, k], x, v, period, fraction)
             still = abs(decay[i, k]) * period < 1e-9
-            # a mode that the wall does not move, or the sensor does not read, is only rounding: it is left out
+            # a mode that the wall does not move, or the sensor does not read, is only rounding: it is left out.
+            # The numerators of a free mode are of the size of its share times the period squared
             level = reach[i] * period**2 * (UNOBSERVED_UNDAMPED if still else UNOBSERVED)
             size = 0.0
             for c in range(2, 8):

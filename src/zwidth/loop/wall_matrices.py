@@ -122,10 +122,10 @@ class WallMatrices:
             root = np.sqrt(size[kept])
             inverse = axes[:, kept] / root
             s, Q = np.linalg.eigh(inverse.T @ self.stiffness @ inverse)
-            for exact in (0.0, 0.5, 1.0):
+            for exact in (0.0, 0.5, 1.0):  # damping alone, both alike, stiffness alone: without their rounding
                 s[np.abs(s - exact) <= ROUNDING] = exact
             S, v = Q.T @ (axes[:, kept] * root).T, 1.0 - s
-        larger = np.maximum(s, v)
+        larger = np.maximum(s, v)  # goes into the combinations, so that the larger of the two is 1
         return PrincipalDirections(np.sqrt(larger)[:, None] * S, s / larger, v / larger)
 
 

@@ -79,7 +79,7 @@ def phase_delay(method: VelocityMethod | Estimator, period: float, frequency_Hz:
 
 def low_frequency_delay(estimator: Estimator, period: float) -> float:
     """The phase delay's limit at frequency 0 [s]: -d ln R/ds at s = 0, with d = s T + (s T)^2/2 + ..."""
-    samples = -0.5
+    samples = -0.5  # of the differentiator, d/(s T) = 1 + s T/2 + ...
     for top, bottom in zip(estimator.numerator, estimator.denominator, strict=True):
         samples += bottom[1] / bottom[2]
         samples -= top[0] / top[1] if top[2] == 0.0 else top[1] / top[2]

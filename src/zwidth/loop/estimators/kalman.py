@@ -71,7 +71,7 @@ class Kalman:
         return self.alpha_beta(period).noise_gain(period)
 
     def _share(self, period: float) -> float:
-        """1 - r, without cancellation: r solves 2 r^2 - (4 + Lambda) r + 2 = 0."""
+        """1 - r, without cancellation: u = 1 - r is the positive root of 2 u^2 + Lambda u - Lambda = 0."""
         check_period(period)
         index = self.acceleration_noise * period**2 / self.position_noise
         low, high = INDEX

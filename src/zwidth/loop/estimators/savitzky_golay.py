@@ -92,7 +92,7 @@ def _weights(n: int, order: int, centred: bool) -> tuple[float, ...]:
     at = (Fraction(0), Fraction(1))  # t_{m-1}(s), t_m(s)
     slope = (Fraction(0), Fraction(0))
     shares, sums = [], []  # of each m: -t_m'(s) / h_m, and the running sums of t_m(k) over k
-    for m in range(order):
+    for m in range(order):  # each turn makes polynomial, slope and norm of degree m + 1
         a, b = 2 * m + 1, m * (n * n - m * m)
         before, here = here, [(a * (2 * k - n + 1) * here[k] - b * before[k]) // (m + 1) for k in ages]
         lever = 2 * place - n + 1

@@ -74,6 +74,7 @@ def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Res
     kept = (
         error < MOST_ERROR if np.count_nonzero(error < MOST_ERROR) >= FEWEST else np.ones(len(error), dtype=bool)
     )
+    # the coherence that would tell this error, `model.response.relative_error` solved for it
     coherence = 1.0 / (1.0 + 2.0 * response.averages * error**2) if port.errors_known else None
     return replace(
         response,

@@ -106,7 +106,7 @@ def relative_deviation(path: MeasuredPath, averages: float) -> Floats:
     """Relative standard deviation (n,) of the real and of the imaginary part of a path: from repeated sweeps that
     of their mean, from coherence as `relative_error`; 0 where neither is known, inf where coherence is lost."""
     if path.sweeps is not None:
-        k = len(path.sweeps)
+        k = len(path.sweeps)  # variance over k - 1, half of it in each part, and a k-th of that in the mean
         spread = np.sum(np.abs(path.sweeps - path.value) ** 2, axis=0) / (2.0 * max(k - 1, 1) * k)
         return np.asarray(np.sqrt(spread) / np.maximum(np.abs(path.value), 1e-300))
     if path.coherence is None:

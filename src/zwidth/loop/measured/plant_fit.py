@@ -128,6 +128,7 @@ def fit_plant(response: Response, period: float) -> PlantFit:
     value = model.paths(["sa"], data.theta)["sa"]
     deviation = np.abs(value / data.values["sa"] - 1.0)
     below = data.theta < 0.95 * np.pi  # at half the rate a free mass answers with next to nothing
+    # deviations are those of the real and of the imaginary part: their squares add up to twice the one
     noise = float(np.sqrt(np.mean(2.0 * (data.deviations["sa"] / np.abs(data.values["sa"]))[below] ** 2)))
     noise = noise if response.coherence is not None or response.sweeps is not None else 0.0
     misfit, worst = float(np.sqrt(np.mean(deviation[below] ** 2))), int(np.argmax(np.where(below, deviation, 0.0)))
@@ -179,6 +180,8 @@ def _ends_of_modes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) 
     assert sa is not None
 
     def root(own: Floats) -> Floats:
+        """Square root (n,) of the sizes of residues: the end of a path that begins and ends there, or its even
+        share of both ends. Never 0, since residues are divided by it."""
         size = np.abs(own)
         return np.asarray(np.sqrt(np.maximum(size, 1e-12 * np.max(size) + 1e-300)))
 
@@ -209,7 +212,7 @@ def _fitted(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool)
         return np.nan_to_num(_model_residual(data, unpack(x)), nan=1e6, posinf=1e6, neginf=-1e6)
 
     x = _numbers_of_model(data, start, at_sensor, tied_ends)
-    scale = np.maximum(np.abs(x), 1e-3 * np.max(np.abs(x)))
+    scale = np.maximum(np.abs(x), 1e-3 * np.max(np.abs(x)))  # of numbers next to 0, too
     if len(x) > 2 * len(data.theta) * len(data.values):
         return start
 

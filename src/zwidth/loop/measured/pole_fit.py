@@ -29,11 +29,11 @@ EXACT: Final = 1e-6  # relative misfit at which no mode is missing
 GAIN: Final = 0.95  # of the misfit before, above which a mode more explains nothing
 RATIOS: Final = (0.001, 0.005, 0.02, 0.08, 0.3, 1.0)  # damping ratios of modes tried
 TRIED: Final = 40  # frequencies of modes tried, beside the peaks of what is left
-PEAKS: Final = 8
+PEAKS: Final = 8  # of those, the highest
 HIGHEST: Final = 1.9 * np.pi  # angle of the fastest mode: at 2 pi the hold hides it
 LARGEST_DELAY: Final = 200.0  # samples
 POINTS: Final = 300  # by which poles are found
-STEPS: Final = 25
+STEPS: Final = 25  # of each search from a start
 STEP: Final = 1e-6  # relative, of derivatives
 
 
@@ -131,6 +131,7 @@ def fit_poles(data: PathData) -> PoleModel:
 def _search(data: PathData) -> tuple[float, float, Floats]:
     """Misfit, delay and modes of the best of searches from several delays, each with a mode more than before until
     two in a row explain nothing."""
+    # one pole at z = 1: a mass on a dashpot, whose decay is looked for from ten times the lowest angle
     first = np.array([[0.0, 10.0 * data.theta[0]]]) if data.integrators == 1 else np.zeros((0, 2))
     # all are (misfit, delay, modes)
     states = [(np.inf, delay, first) for delay in (DELAYS if data.delay is None else (data.delay,))]
@@ -237,6 +238,7 @@ def _refine(data: PathData, modes: Floats, delay: float) -> tuple[Floats, float]
         return new, delay if fixed else float(x[-1])
 
     x0 = np.log(np.where(modes == 0.0, 1.0, modes)).ravel()
+    # bounds of a mode's angle, from far below the data to HIGHEST, and of its damping ratio or decay
     low = np.tile([np.log(data.theta[0] / 30.0), np.log(1e-6)], len(modes))
     high = np.tile([np.log(HIGHEST), np.log(50.0)], len(modes))
     if not fixed:
@@ -286,7 +288,7 @@ def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
         whole = np.einsum("ij,ij->j", atoms, atoms)
         atoms -= basis @ (basis.T @ atoms)
         size = np.einsum("ij,ij->j", atoms, atoms)
-        # what a projection on one atom more takes off the square of the rest
+        # what a projection on one atom more takes off the square of the rest; nothing of one that the others span
         gain += np.where(size > 1e-16 * whole, (rest @ atoms) ** 2 / np.maximum(size, 1e-300), 0.0)
     return np.vstack([modes, tried[np.argmax(gain)]])
 
