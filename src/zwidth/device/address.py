@@ -552,6 +552,7 @@ def _copy_angles(leg: Any) -> list[float]:
     angles, count = _field(leg, "angles_rad"), _field(leg, "count")
     if isinstance(angles, list | tuple) and all(map(is_number, angles)):
         return list(angles)
+    # a count that is larger is a fault, which others report
     if isinstance(count, int) and 0 < count < 100:
         return [2.0 * math.pi * k / count for k in range(count)]
     return [0.0]

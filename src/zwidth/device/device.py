@@ -541,6 +541,7 @@ class Device:
                 goal, axes = place_of_joints(mechanism, angles, name)
         else:
             goal = self.position(position, assembly)
+        # a single position, as typed, is moved onto one that the handle has; of several none is
         single = goal.ndim == 1 and (axes is None or axes.ndim == 2) and not mechanism.design_shape
         with self.solving(assembly) as name:
             return solve_posture(

@@ -413,7 +413,8 @@ def typical_size(document: dict[str, Any], steps: KeyPath) -> float:
 
 def _size_of_key(document: dict[str, Any], steps: KeyPath) -> float:
     """Size of numbers like that at a path: the largest of the same key in the same part of the file, else the
-    usual one, else by the sampling period for a time or a frequency; 0 where unknown."""
+    usual one, else the sampling period for a time, a tenth of the sampling rate for a frequency; 0 where
+    unknown."""
     key, period = _last_key(steps), document.get("loop", {}).get("sampling_period_s", 0.0)
     beside = [
         abs(value) for path, value in _finite_numbers(document) if _last_key(path) == key and path[0] == steps[0]

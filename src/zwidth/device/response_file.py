@@ -85,6 +85,7 @@ def read_response(section: ResponseSection, label: str, period: float) -> Respon
 def _check_frequencies(path: Path, frequency: Floats, first: Floats, first_name: str) -> None:
     """Raise DeviceError where the frequencies of a file, `path`, are not those of the first file, called
     `first_name`."""
+    # 1e-6: files may be written with few digits
     if len(frequency) != len(first) or np.any(np.abs(frequency - first) > 1e-6 * first):
         raise fail(str(path), "", f"has other frequencies than {first_name}; sweeps must share them")
 

@@ -115,6 +115,7 @@ def fit_least_squares(
     quantile = np.broadcast_to(_half_widths(level, scale_known_by, widening), x.shape)
     sigma = np.sqrt(np.diag(covariance))
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
+    # without residuals all intervals are of no width
     if profiled and scale > 0.0:
         least = float(np.sum(r**2))
         places = _distinct_minima(minima, solved, scale**2 / thinned)
@@ -140,6 +141,7 @@ def _minima(
 
     settings = {"bounds": bounds, "x_scale": "jac", "diff_step": diff_step}
     minima = [least_squares(residuals, start, xtol=1e-10, ftol=tolerance, gtol=1e-12, **settings)]
+    # rivals less exactly: enough to see which minimum is the least, and which are one
     minima += [
         least_squares(residuals, place, xtol=1e-8, ftol=max(tolerance, 1e-8), gtol=1e-12, **settings)
         for place in rivals
@@ -209,6 +211,7 @@ def _covariance(jacobian: Floats) -> Floats:
     """Covariance (J^T J)^-1 (p, p) by the derivatives J (n, p); the variance of a parameter that changes no
     residual is inf."""
     _, size, rows = np.linalg.svd(jacobian, full_matrices=False)
+    # directions that change the residuals by more than rounding; `lost`: parameters that move along the others
     felt = size > 1e-12 * np.max(size, initial=1e-300)
     inverse = rows[felt].T / size[felt]
     covariance = np.asarray(inverse @ inverse.T)
@@ -275,7 +278,9 @@ class _EndSearch:
         inner, outer  steps with too small and too large a rise, nan where none was seen;   rises  step -> root
         """
         if np.isnan(outer):
+            # as far as the straight line says, by a factor of 1.2 to 4
             return inner * float(np.clip(1.0 / max(rises[inner], 0.1), 1.2, 4.0))
+        # kept off both ends, so that the bracket shrinks where the line is bent
         share = (1.0 - rises[inner]) / (rises[outer] - rises[inner])
         return inner + float(np.clip(share, 0.1, 0.9)) * (outer - inner)
 
@@ -296,6 +301,8 @@ class _EndSearch:
             return float(np.sum(held(np.zeros(0)) ** 2)) - self.least, self.best.copy()
         sigma = np.sqrt(np.diag(self.covariance)[others])
         size = np.maximum(np.abs(self.best[others]), SHORTEST)
+        # SHORT of a standard deviation, this taken for no more than the parameter itself or 1; of a parameter
+        # that changes nothing SHORTEST of its size
         step = np.where(np.isfinite(sigma), SHORT * np.minimum(sigma, np.maximum(size, 1.0)), SHORTEST * size)
         step = np.maximum(step, (self.diff_step or 0.0) * size)
         start = min((one[others] for one in starts), key=lambda some: float(np.sum(held(some) ** 2)))
@@ -314,6 +321,7 @@ def _descended(
     enough  what a step must gain for another one to be made: an end needs no more digits than its rise
     """
     r = residuals(x)
+    # undamped, as long as plain Gauss-Newton steps gain
     least, damping = float(np.sum(r**2)), 0.0
     for _ in range(MOST_TRIALS):
         side = np.where(x + step <= high, step, -step)  # away from the upper bound

@@ -120,6 +120,7 @@ def sound_of(response: TimeResponse, pitch: Pitch = None, full_scale: float | No
     peak = float(np.abs(once).max())
     # full scale in units of `once`, since velocities of a run that grows without bounds overflow in m/s
     limit = peak / PEAK if full_scale is None else full_scale / unit
+    # a peak below half a step of 16 bits
     if 2.0 * LARGEST_NUMBER * peak < limit:
         text = f"the vibration, of at most {peak * unit:.3g} m/s, is below the resolution of the file"
         raise NoAnswerError(f"{text} at a full scale of {full_scale:g} m/s")

@@ -355,6 +355,7 @@ def _balanced_stiffness(excess: Callable[[float], float], near: float) -> tuple[
             break
         high += STEP
     # downwards to one that is too small, then between the two
+    # not where the search upwards has ended without a posture or a stable wall
     for _ in range(STEPS if ratio > -inf else 0):
         low = high - STEP
         ratio = excess(low)

@@ -218,6 +218,7 @@ class _Edge:
 
     def __init__(self, chart: StabilityChart) -> None:
         self.tracer = Tracer(chart.loop)
+        # frequency [Hz] over the angle of a root on the circle, per sample
         self.hertz = 1.0 / (2.0 * pi * chart.loop.period)
         nyquist = 0.5 / chart.loop.period
         arcs = [arc for arc in chart.boundary if np.ptp(arc.frequency) > 0.0]

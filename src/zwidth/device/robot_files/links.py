@@ -64,6 +64,7 @@ class LinkTree:
         stem = "base-link" if plain == "base" else plain[:LONGEST_NAME]
         made, count = stem, 2
         while made in self.taken:
+            # room for a number of three digits
             made = f"{stem[: LONGEST_NAME - 4]}-{count}"
             count += 1
         self.taken.add(made)
@@ -281,6 +282,7 @@ def merge_universal(robot: Robot, named: set[str]) -> None:
             unnamed
             and alike
             and np.array_equal(first.anchor, second.anchor)
+            # 0.1: the sine of the angle between axes that are far from parallel
             and np.linalg.norm(np.cross(first.axis, second.axis)) > 0.1
         ):
             universal = replace(

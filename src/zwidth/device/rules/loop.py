@@ -20,8 +20,8 @@ from zwidth.loop.estimators.kalman import INDEX
 
 # Lags in sampling periods. A shorter one changes no wall by what a chart resolves, a longer one is an integrator;
 # beyond either rounding would give the answers.
-SHORTEST_LAG: Final = 1e-6
-LONGEST_LAG: Final = 1e6
+SHORTEST_LAG: Final = 1e-6  # sampling periods; a time constant below is a slip of the unit
+LONGEST_LAG: Final = 1e6  # sampling periods
 WHOLE: Final = 1e-6  # samples, by which a whole delay may be off
 MANY_SAMPLES: Final = 1e9  # of delay, from which on none counts as whole
 AHEAD: Final = "loop.feedforward"

@@ -32,7 +32,7 @@ JOINT_KEYS: Final[dict[str, tuple[str, ...]]] = {
 # Joint of a drive -> the key of the table's coordinates, the key of the link's limits, the unit.
 OF_JOINT: Final = {"revolute": ("joint_rad", "limits_rad", "rad"), "prismatic": ("joint_m", "limits_m", "m")}
 RATIO_KEYS: Final = {"joint_rad", "joint_m", "ratio"}
-FULL_TURN: Final = 2.0 * math.pi * (1.0 + 1e-9)
+FULL_TURN: Final = 2.0 * math.pi * (1.0 + 1e-9)  # rad, to rounding
 METHODS: Final = ("assumed-modes", "finite-elements", "lumped")
 STIFFNESSES: Final = (
     "bending_stiffness_Nm2",

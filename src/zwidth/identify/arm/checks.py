@@ -98,6 +98,7 @@ def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits:
             constant.append(name)
             continue
         clipped = _clipped_share(forces)
+        # 1.001, and 0.9999 below: a record and the limit are rounded
         if np.mean(np.abs(forces) > 1.001 * limits[k]) > OVER_LIMIT:
             beyond.append(f"{name} (to {most:.3g} of {limits[k]:.3g})")
         elif clipped > CLIPPED or np.mean(np.abs(forces) > 0.9999 * limits[k]) > OVER_LIMIT:
@@ -150,7 +151,8 @@ def velocity_check(
         best = int(np.argmax(np.abs(alike)))
         power = max(float(rates[:, k] @ rates[:, k]), 1e-300)
         slope = float(velocity @ rates[:, k]) / power
-        # noise of the derivative draws this slope towards 0, of the velocity slope_by_velocity from it
+        # noise of the derivative draws this slope towards 0, of the velocity slope_by_velocity from it:
+        # the true one lies between, so that both must be off
         slope_by_velocity = float(velocity @ velocity) / power / slope if slope else 0.0
         column = channels.velocity[k]
         if best != k and abs(alike[best]) > ALIKE and abs(alike[k]) < ALIKE:
@@ -207,6 +209,7 @@ def other_readings(
     as_recorded = unexplained(y, scale)
     tried = list[tuple[float, str]]()
     d = len(names)
+    # of a single drive the other sign turns all parameters, and explains as much
     for k in range(d if d > 1 else 0):
         sign = np.ones(d)
         sign[k] = -1.0
@@ -299,6 +302,7 @@ def drive_channels_of(device: Device, record: Record, side: Side) -> DriveChanne
         )
     coordinate, force, velocity = zip(*rows, strict=True)
     n = np.asarray(drives.transmission, dtype=np.float64)
+    # from the motor to the joint the angle is divided by the ratio n, the torque multiplied
     to_drive, to_force = np.diag(1.0 / n), np.diag(n)
     if side == "joint":
         to_drive = pack(mechanism).to_drive[0]

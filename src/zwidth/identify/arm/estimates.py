@@ -112,6 +112,7 @@ def joint_friction_estimates(
                 "N m",
                 float(drives.transmission[i]),
             )
+        # coupled drives move several joints: their viscous friction is no single joint's
         elif what == 1 and drives.coupling is None:
             key = "joint_damping_Ns_per_m" if slides else "joint_damping_Nms_per_rad"
             path = f"mechanism.links.{link}.{key}"
@@ -184,6 +185,7 @@ def _inertia_as_in_file(device: Device, at: str, inertia: Floats, axis: Floats) 
     if isinstance(given, int | float):
         return _rounded(float(axis @ inertia @ axis))
     products = np.abs(inertia - np.diag(np.diag(inertia)))
+    # three moments, as long as the products of inertia are rounding
     if isinstance(given, list) and not isinstance(given[0], list) and np.max(products) < 1e-9 * np.max(inertia):
         return [_rounded(x) for x in np.diag(inertia)]
     return [[_rounded(x) for x in row] for row in 0.5 * (inertia + inertia.T)]
@@ -327,6 +329,7 @@ def consistent_links(
     parameters = base.parameters
     file = pseudo_inertias(mechanism, parameters.bodies)
     roots = np.asarray(np.linalg.cholesky(file), dtype=np.float64)
+    # 1e-6 kg m² where the file has 0 or none: coordinates are logarithms
     rotors = np.array([_positive_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
     root = _information_root(information)
     friction = np.arange(*parameters.friction.indices(len(parameters.names)))
@@ -449,6 +452,7 @@ def pseudo_inertias(mechanism: Mechanism, bodies: tuple[int, ...]) -> Floats:
             inertia = moments[2] * np.eye(3)
         spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia  # S about the centre of mass
         widths, axes = np.linalg.eigh(0.5 * (spread + spread.T))
+        # a mass without inertia counts as a hundredth of its link's length wide
         least = THIN * max(float(widths[-1]), mass * (1e-2 * length) ** 2)
         spread = axes @ np.diag(np.maximum(widths, least)) @ axes.T
         out[k, :3, :3] = spread + mass * np.outer(center, center)

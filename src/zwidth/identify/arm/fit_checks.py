@@ -61,6 +61,7 @@ def excitation_check(fit: Regression, base: BaseParameters, beta: Floats) -> Che
     """Check how well the record tells the parameters apart, values beta (b,), against their deviations."""
     inertial = [k for k, j in enumerate(base.kept) if j < base.parameters.friction.start]
     deviations = fit.deviations
+    # whose 95 % interval holds 0
     loose = [k for k in inertial if 1.96 * deviations[k] > abs(beta[k])]
     seen = f"{len(base.kept)} base parameters, condition number {fit.condition:.3g}"
     if len(loose) == len(inertial):
@@ -98,6 +99,7 @@ def timing_check(fit: Regression, period: float, torque: str) -> Check:
     """
     shift, deviation = fit.delay, fit.delay_deviation
     seen = f"torques act {abs(shift):.2g} s (+-{2.0 * deviation:.1g} s) {'after' if shift > 0.0 else 'before'} "
+    # a shift within four deviations may be chance
     if abs(shift) < SHIFT * period or abs(shift) < 4.0 * deviation:
         return Check("timing", True, f"{seen}their time stamps, within half a period")
     advice = "correct the loop's delay" if torque == "commanded" else 'if they are commands, torque = "commanded"'
@@ -126,8 +128,10 @@ def gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Ch
     if not np.any(G):
         return None
     directions, singular, _ = np.linalg.svd(G, full_matrices=False)
+    # without those that are rounding
     directions = directions[:, singular > 1e-6 * singular[0]]
     share = float(np.sum((directions.T @ residuals) ** 2) / max(float(residuals @ residuals), 1e-300))
+    # of less than five torques a direction much is explained by chance
     if share < GRAVITY or len(residuals) < 5 * directions.shape[1]:
         return None
     reason = f"{100.0 * share:.3g} % of the unexplained torque depends on the posture as gravity's does"
@@ -259,7 +263,8 @@ class TorqueComparison:
     start: Floats
 
     def of(self, stretch: TorqueStretch, static: Sequence[Floats] = ()) -> Compared:
-        """The measured torques of a stretch, and the torque per unit of each base parameter (the columns).
+        """The measured torques of a stretch, and as columns the torque per unit of each base parameter; the last
+        column is the torques' derivative.
 
         static   gravities (3,) of which further columns are made
         Raises NoAnswerError  where the mechanism cannot be
@@ -345,10 +350,12 @@ def error_sources(
     filtered = np.convolve(taps, taps[::-1])[len(taps) - 1 :: thin]  # white noise behind the kernel
     lags = min(len(filtered), LAGS)
     white = np.tile(filtered[:lags, None], (1, seen[0].torques.shape[1]))
+    # 0: the last column, the derivative of the torques, is left out
     best = np.append(fit.values, 0.0)
     by_positions = np.zeros_like(white)
     for plus, minus in zip(noisy[::2], noisy[1::2], strict=False):
         for one, other in zip(plus, minus, strict=True):
+            # half the difference of both signs: to first order what the noise does
             error = 0.5 * ((one.columns - other.columns) @ best)
             for k in range(min(lags, len(error))):
                 by_positions[k] += np.sum(error[: len(error) - k] * error[k:], axis=0)

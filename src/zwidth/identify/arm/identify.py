@@ -311,7 +311,8 @@ class _Work:
         """Check the stretches' lengths, recorded velocities, and what the model of rigid links leaves out."""
         checks = list[Check]()
         wide, narrow = band.wide, band.narrow
-        # both kernels take their reach off either end, the wide one twice: what is left is 1.5 times as long
+        # both kernels take their reach off either end, the wide one twice: what is left is 1.5 times as long; and
+        # 300 samples, whatever the kernels
         needed = 2.5 * (4.0 * wide.reach + 2.0 * narrow.reach)
         longest = max(one.longest * one.period for one in samplings)
         if longest < needed or longest / band.period < 300:
@@ -342,6 +343,7 @@ class _Work:
         if self.torque == "commanded":
             controller, T = self.device.controller, band.period
             lag = controller.actuator_time_constant
+            # half the variance in time: T^2/12 of a command held for T, lag^2 of a first-order lag
             timing = TorqueTiming((controller.delay + 0.5) * T + lag, T**2 / 24.0 + 0.5 * lag**2)
         for number, (record, sampling, channel) in enumerate(zip(self.records, samplings, channels, strict=True)):
             self.progress("smoothing", number, len(self.records))

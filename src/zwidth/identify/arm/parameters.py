@@ -118,6 +118,7 @@ class Parameters:
                 rank = 6 if j == 0 else 5 if j < 4 else 1 if j == 4 + about else 2 if j > 6 else 3
                 # of the two other moments of inertia the latter adds to those kept: I_xx - I_yy
                 rank += int(j in (4, 5, 6) and rank == 3 and j == max(x for x in (4, 5, 6) if x != 4 + about))
+                # of one rank the later links first
                 keys.append((rank, -k, j))
         keys += [(7, k, 0) for k in range(len(self.rotors))]
         keys += [(0, k, 0) for k in range(len(self.names) - len(keys))]  # friction
@@ -168,7 +169,7 @@ def base_parameters(parameters: Parameters, start: Floats, gravity: Floats) -> B
     size = np.sqrt(np.einsum("rp,rp->p", W, W))
     scaled = W / np.where(size > 0.0, size, 1.0)
     kept, basis = list[int](), np.zeros((W.shape[0], 0))  # basis: of the columns kept, orthonormal
-    # parameters that change a torque by more than rounding
+    # parameters that change a torque by more than rounding, 1e-12 of the largest
     felt = size > DEPENDENT * np.max(size[: parameters.inertial], initial=0.0) * 1e-4
     for j in parameters.order:
         left = scaled[:, j]
@@ -195,6 +196,7 @@ def _random_columns(parameters: Parameters, start: Floats, gravity: Floats) -> F
     d = mech.driven
     driven = mech.joint[-d:]  # the driven joints are the last
     scale = np.where(mech.kind[driven] == PRISMATIC, mech.size[0], 1.0)
+    # four torques for each parameter, and a few states more
     wanted, rows = 4 * len(parameters.names) // d + 8, list[Floats]()
     for _ in range(TRIES * wanted):
         step = mech.to_drive[0] @ (rng.uniform(-TURN, TURN, d) * scale)
@@ -203,6 +205,7 @@ def _random_columns(parameters: Parameters, start: Floats, gravity: Floats) -> F
         if angles is None:
             continue
         coordinates = (mech.to_drive[0] @ angles[driven])[None]
+        # how fast the states are does not matter: only the rank of the columns counts
         links, _, done = inertia_regressor(mech, angles, coordinates, rates, 3.0 * accelerations, gravity)
         if done:
             rows.append(parameters.columns(links, rates, 3.0 * accelerations, np.sign(rates))[0])

@@ -76,6 +76,7 @@ class Regression:
         """Which (k,) of the functions with gradients (k, b) change with parameters that change no torque."""
         scaled = gradients * self.size
         length = np.linalg.norm(scaled, axis=1)
+        # 1e-5: above the rounding of the gradients
         return np.asarray(np.linalg.norm(scaled @ self.unseen, axis=1) > 1e-5 * length)
 
     @property
@@ -115,6 +116,7 @@ def regress(
         residuals = [y - X @ values for X, y in zip(columns, torques, strict=True)]
         whitening = _whitening_filters(residuals, sources)
         white = np.concatenate([_filtered(r, whitening) for r in residuals])
+        # less two: S^-1, which weighs, is then right in the mean (exactly so of one joint)
         weight = _inverse_factor(white.T @ white / max(len(white) - len(values) / d - 2.0, 1.0))
         information, moment = _sums(columns, torques, whitening, weight)
         values = _solve(information, moment)[0]
@@ -198,6 +200,7 @@ def _inverse_factor(covariance: Floats) -> Floats:
     """L^-1 (d, d) of a covariance L L^T; a variance of 0, of data without errors, is replaced by a small one."""
     scale = np.sqrt(np.diag(covariance))
     scale = np.where(scale > 0.0, scale, max(float(np.max(scale, initial=0.0)), 1e-150))
+    # 1e-9: joints with the same errors would leave it singular
     correlation = covariance / scale[:, None] / scale + 1e-9 * np.eye(len(scale))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
 
@@ -293,6 +296,7 @@ def _source_levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
     lags = np.arange(shapes.shape[1])
     for r in residuals:
         n = len(r)
+        # without the mean, and without Nyquist's line
         power.append((np.abs(np.fft.rfft(r)) ** 2 / n)[1 : (n + 1) // 2])
         angle = 2.0 * np.pi * np.arange(1, (n + 1) // 2)[:, None] / n * lags
         weights = np.where(lags > 0, 2.0, 1.0) * np.maximum(1.0 - lags / n, 0.0)
@@ -304,6 +308,7 @@ def _source_levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
     for _ in range(WHITTLE):
         S = np.maximum(S, FLOOR * float(np.max(S)) + 1e-300)
         levels = nnls(A / S[:, None], I / S)[0]
+        # no source explains anything: all count alike
         if not levels.any():
             return np.full(len(shapes), scale)
         S = A @ levels

@@ -125,6 +125,7 @@ class TorqueBand:
     @property
     def wide(self) -> Kernel:
         """The low pass of the positions."""
+        # of its own edge, 1.5 WIDE times the analysed one, half is flat: 1.2 of the analysed edge
         f = WIDE * self.edge
         return Kernel(1.5 * f, WIDTH / (1.5 * f))
 
@@ -191,15 +192,18 @@ def choose_band(
         floors = np.array([_floor(frequency, row) for row in density.T])
         noise = np.maximum(noise, floors)
         for row, level in zip(density.T, floors, strict=True):
+            # 1e-13 of the largest is rounding
             above = np.flatnonzero(row > ABOVE * max(level, 1e-13 * float(np.max(row))))
             edge = max(edge, float(frequency[above[-1]]) if len(above) else 0.0)
     longest = max(one.longest for one in sampling) * period
     length = sum(one.rows for one in sampling) * period
     lowest = SHORTEST / longest
-    # the record's sampling, and a length that can be worked on, bound the band from above
+    # the record's sampling, and a length that can be worked on, bound the band from above; 1.5 WIDE is the edge
+    # of the positions' kernel over that of the band (`TorqueBand.wide`)
     most = min(1.0 / (SAMPLES * 1.5 * WIDE * period), LONGEST / (SAMPLES * 1.5 * WIDE * length), highest)
     analysed = min(max(edge, lowest), most)
     stride = max(int(1.0 / (SAMPLES * 1.5 * WIDE * analysed * period)), 1)
+    # long strides in multiples of FINE, so that records can be thinned first (`coarse`)
     stride = stride if stride < FINE else FINE * (stride // FINE)
     return TorqueBand(analysed, period, stride, noise, edge)
 

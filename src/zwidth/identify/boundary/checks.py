@@ -281,6 +281,7 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
     if faults:
         seen += f"; {comma_list(faults)}"
     gross = remains > GROSS and (share < HALF or (chance < SYSTEMATIC and share < MOST))
+    # a single tried wall on the wrong side refuses nothing
     if gross or lost > LOST * len(edges) or wrong > max(LOST * len(depths), 1.0):
         text = (
             f"{seen}: no value of the numbers that were named explains this boundary; look at what is held fixed "

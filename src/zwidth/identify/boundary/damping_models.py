@@ -89,6 +89,7 @@ class DampingModel:
         if device.response is not None:
             text = "a measured response has its damping in it; models are for a [mechanism] or a [plant]"
             raise fail(device.label, "damping_models", text)
+        # a model without numbers yet, which `_bare_loop` does not read
         plant = cls(name, np.empty(0), device, point)._bare_loop(device).plant
         frequencies = natural_frequencies(plant)
         flexible = frequencies[frequencies > RIGID * np.max(frequencies, initial=0.0)]

@@ -51,7 +51,8 @@ class BoundaryFit:
         return self.fit.values
 
     def ends(self, i: int) -> tuple[float, float, float]:
-        """The i-th number and the ends of its interval; the bound that the file sets where the data set none."""
+        """The i-th number and the ends of its interval; where the data set no lower end the file's bound, 0 of a
+        positive number."""
         low, high = self.fit.low.copy(), self.fit.high.copy()
         numbers = self.parameters
         limited = ~numbers.positive & np.isfinite(numbers.lower) & np.isneginf(low)
@@ -66,6 +67,7 @@ def measured_ranges(points: BoundaryPoints) -> Scatter:
     edges = points[points.on_edge]
     frequency = edges.frequency[edges.frequency > 0.0]
     reach = [
+        # values all alike reach as far as their size, and 1 where they are 0 or none
         float(np.ptp(values)) or float(np.max(np.abs(values), initial=0.0)) or 1.0 if len(values) else 1.0
         for values in (edges.stiffness, edges.damping, frequency)
     ]
@@ -167,7 +169,7 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
     order = np.argsort([size(one) for one in tried], kind="stable")
     step = COARSE_STEP if model.interpolated(begin) else None
     fits = list[Fit]()
-    several = len(begin) > 1  # several numbers have other minima near the points, too
+    several = len(begin) > 1  # then other minima lie near the points, too: two fits must agree
     for k in order[:STARTS]:
         fits.append(_fit(model, parameters, scatter, tried[k], step, tolerance=COARSE, profiled=False))
         sums = sorted(fit.sum_of_squares for fit in fits)
@@ -210,6 +212,7 @@ def _remaining_scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: S
         part = parts[name] | (parts["distance"] if name == "damping" else False)
         if part.any():
             # points of unknown edges deviate in units of both, and count with the damping
+            # 0.5 at least, where the numbers take up all that a kind says
             nu = max(freedom[name] + (freedom["distance"] if name == "damping" else 0.0), 0.5)
             own[name] = max(
                 deviation * float(np.sqrt(np.sum(fit.residuals[part] ** 2) / nu)) / span, LEAST_SCATTER

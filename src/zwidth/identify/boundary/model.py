@@ -184,9 +184,9 @@ def relative_scatter(points: BoundaryPoints) -> Floats:
 
         s^2 = (4 usual^2 + (n - 1) own^2) / (3 + n)
 
-    and the mean of n trials has s / sqrt(n). Ends of one trial are a bracket, width / sqrt(12). Points without
-    ends have the usual spread. Their mean square over each kind is 1, so that the scatter is scaled by what
-    remains in any case.
+    and the mean of n trials has s / sqrt(n). Ends of one trial are a bracket, own = width / sqrt(12), with
+    the weight 4 in place of n - 1. Points without ends have the usual spread. Their mean square over each kind is
+    1, so that the scatter is scaled by what remains in any case.
     """
     relative = np.ones(len(points))
     for kinds in ((TIP,), (EDGE,), tuple(set(points.kind.tolist()) - {TIP, EDGE})):

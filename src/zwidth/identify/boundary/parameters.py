@@ -156,7 +156,8 @@ class BoundaryParameters:
 
     def _usual_change(self, i: int) -> float:
         """A usual change of the i-th number: 0.3 of it; where it is 0, the power of ten by which it must change
-        for the largest stiffness of the chart to change by a hundredth."""
+        for the largest stiffness of the chart to change by a hundredth, or a tenth of that which leaves no chart;
+        1 where none does either."""
         if self.start[i] != 0.0:
             return 0.3 * abs(float(self.start[i]))
         try:

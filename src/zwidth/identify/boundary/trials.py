@@ -92,6 +92,7 @@ class TrialPlan:
                 else disturbance
             )
             least = float(seen[i]) if seen[i] > 0.0 else VISIBLE_STEPS * step
+            # half the displacement at most: the displacement itself must count as seen
             limit = min(least, 0.5 * moved) if visible is None else visible
             time = float(times[i]) if times[i] > 0.0 else None
             disturbing.append(Disturbing(max(float(pushes[i]), 0.0), moved, limit, time))
@@ -315,6 +316,7 @@ def _simulated_edges(
     edge = parameters.edge(x)
     _, K1, _, B1 = edge.box  # largest stiffness [N/m] and damping [N s/m] of the chart's edge
     stiffest = edge.first[int(np.argmax(edge.first[:, 0]))] if len(edge) else np.array([K1, B1])
+    # edges are looked for from a damping above 0; True: the chart's edge ends at its tip
     extent = StableExtent(float(stiffest[0]), max(float(stiffest[1]), 0.05 * B1), B1, True)
     found = EdgeCrossing(
         np.full(len(points), np.nan), points.kind == TIP, np.ones(len(points)), np.full(len(points), np.nan)

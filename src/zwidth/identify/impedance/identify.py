@@ -391,6 +391,7 @@ def _check_against_prediction(state: _State, wall: tuple[float, float] | None) -
         f"the frequencies, and {decibels:.2g} dB from the measured one in the middle"
         f"{_low_frequency_hint(state, wall)}"
     )
+    # bands of 95 %: by chance a few more may miss
     return [Check("prediction", bool(np.mean(within) >= 0.9), text, warning=True)]
 
 
@@ -430,6 +431,7 @@ def _validation(states: Sequence[_State]) -> float:
         response, _ = state.first.fit(0, 1)
         used = np.isin(state.second.frequency, state.impedance.frequency)
         remains += float(np.sum(state.second.squares_left_by(response)[used]))
+        # `power` is a mean per value, `squares_left_by` a sum
         total += float(np.sum(state.second.power(1)[used])) * state.second.values
     return 1.0 - remains / total if total > 0.0 else float("nan")
 

@@ -135,6 +135,7 @@ def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedan
     magnitude = np.abs(value)
     # where only the position is noisy |Z| is larger by this, with its error
     to_either = 1.0 / np.sqrt(coherence)
+    # half of the complex variance is in each component
     deviation = magnitude * to_either * np.sqrt(0.5 * variance) / np.abs(H1)
     return MeasuredImpedance(f, value, coherence, deviation, magnitude * (to_either - 1.0), float(spectra.freedom))
 
@@ -145,7 +146,7 @@ def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, 
 
     Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of the end towards the
     others is raised by the number of independent ones among those whose bands reach the extreme one. The other
-    end is then missed by hardly any, and this one may be missed for both.
+    end is then hardly ever missed, so that of two and more this one may be missed twice as often as one end.
     """
     size = np.abs(impedance.value)
     k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
@@ -245,6 +246,7 @@ def _deviation_of_mean(impedance: MeasuredImpedance) -> float:
 
     The error of Z is -Z/G times that of G, whose windows overlap (`correlations`).
     """
+    # Z/G is jw Z^2: the phase of Z^2, but for one that all share
     error = impedance.deviation * (impedance.value / np.abs(impedance.value)) ** 2
     f, rho = impedance.frequency, correlations()
     spacing = np.min(np.diff(f)) if len(f) > 1 else 1.0
@@ -270,6 +272,7 @@ def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | N
         return None
     w = 2.0 * np.pi * impedance.frequency
     A = np.column_stack([(1j * w) ** power for power in range(-1, 5)])
+    # 1e-9: for data without noise
     sigma = impedance.deviation + 1e-9 * np.abs(impedance.value)
     # noise on either end scales all of Z: what that changes of it, fitted along with it
     by_bias = impedance.value * impedance.bias / np.abs(impedance.value)

@@ -308,7 +308,8 @@ class _Search:
         return 1e-3 * samples * np.array([1.0, span**2])
 
     def _moved(self, step: Floats) -> JointNumbers:
-        """The numbers a step further, within bounds that keep the motion from running away."""
+        """The numbers a step further, within bounds that keep the motion from running away; the mass falls to a
+        tenth at most."""
         values = self.numbers.with_free(self.numbers.free_values + step).values
         values[MASS] = max(values[MASS], 0.1 * self.numbers.values[MASS])
         return self.numbers.with_free(bounded(values, self.windows)[list(self.numbers.free)])
@@ -503,5 +504,6 @@ def _inverse(scaled: Floats) -> tuple[Floats, Flags]:
     values, vectors = np.linalg.eigh(scaled)
     felt = values > 1e-11  # directions that change the prediction by more than rounding
     inverse = (vectors[:, felt] / values[felt]) @ vectors[:, felt].T
+    # that move along a direction which changes nothing, by more than rounding
     lost = np.any(np.abs(vectors[:, ~felt]) > 1e-3, axis=1)
     return inverse, lost

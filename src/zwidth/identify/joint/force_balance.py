@@ -101,6 +101,7 @@ def force_balance(windows: Windows, resolution: float, *, delay: float = 0.0, sp
     while 2 * sizes[-1] <= np.max(windows.length):
         sizes.append(2 * sizes[-1])
     choices = [(size, moving) for size in sizes for moving in (MOVING, PARTLY)]
+    # the best of several balances is taken: each has a share of the level
     level = BY_CHANCE / len(choices)
     tried = [_balance_over(windows, size, resolution, late, spring, moving, level) for size, moving in choices]
     found = [one for one in tried if one is not None]
@@ -126,6 +127,7 @@ def _balance_over(
         return None
     weight, slope, _ = weighting(size)
     columns, samples, T = force_balance_rows(windows, size, resolution, moving)
+    # a force is held from its sample to the next: its mean about a sample is that of two
     forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
     held = forces[np.clip(samples - late, 0, len(forces) - 1)]
     force, rate = held @ weight, (held @ slope) / T
@@ -134,6 +136,7 @@ def _balance_over(
         [np.full(len(force), np.sum(weight)), rate, *(d[samples] @ weight for d in windows.drifts)], axis=1
     )
     motion = columns[:, : len(NUMBERS) if spring else -1]  # the last column is the spring's
+    # without the constant force, which the levels of dry friction in both directions hold
     inverse, remains, rank = _least_squares(np.concatenate([motion, beside[:, 1:]], axis=1), force)
     freedom = len(force) / OVERLAP - rank
     if freedom < FEWEST_FREE:
@@ -461,6 +464,7 @@ def travels(windows: Windows, resolution: float) -> tuple[float, float]:
     forward = backward = 0.0
     for first, length in zip(windows.first, windows.length, strict=True):
         y = windows.position[first : first + length]
+        # some 50 readings of a window, so that slow motion is more than two steps between them
         y = y[:: max(int(length) // 50, 1)]
         moves = np.diff(y)
         moves = moves[np.abs(moves) > 2.0 * resolution]
@@ -470,7 +474,8 @@ def travels(windows: Windows, resolution: float) -> tuple[float, float]:
 
 
 def directions(windows: Windows, motion: JointMotion) -> tuple[bool, bool]:
-    """Whether the joint slides forward, and backward, by enough to tell friction there."""
+    """Whether the joint slides forward, and backward, by enough to tell friction there; where it goes farther, it
+    always does."""
     forward, backward = travels(windows, motion.resolution)
     least = max(ONE_WAY * (forward + backward), FEWEST_COUNTS * motion.resolution)
     return forward >= least or forward > backward, backward >= least or backward > forward
@@ -495,6 +500,7 @@ def check_standstill(motion: JointMotion) -> Check:
     """How long the joint stands: its friction then hides force and mass."""
     shares = []
     for one in motion.sections:
+        # samples in which a joint that slides moves by more than a step of its reading
         reach = max(8, len(one.position) // 400)
         moved = np.abs(one.position[reach:] - one.position[:-reach])
         shares.append((len(moved), float(np.mean(moved <= 1.5 * motion.resolution)) if len(moved) else 1.0))

@@ -184,6 +184,7 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
         ]
     if STIFFNESS in fitted.fit.numbers.free:
         spring = _sum_estimate(fitted, "spring", "stiffness", ONE[STIFFNESS], key="stiffness")
+        # a device file takes no negative spring
         estimates.append(spring if spring.value > 0.0 else replace(spring, path=""))
     return estimates
 
@@ -234,6 +235,7 @@ def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
     # columns of A: weighted acceleration, velocity, sliding forward, less sliding backward, position
     A, force = weighted_balance(windows, size, fitted.motion.resolution, [delay], 1.0)
     sum_of_weights = float(np.sum(weighting(size)[0]))
+    # 0.999: throughout, to rounding
     one_way = np.abs(A[:, 2] + A[:, 3]) > 0.999 * sum_of_weights
     A, force = A[one_way], force[one_way, 0]
     return A[:, 1] / sum_of_weights, (

@@ -97,7 +97,7 @@ class FittedJoint:
         if (
             balance is None
             or balance.depends is None
-            or weights[DELAY]
+            or weights[DELAY]  # of which a balance says nothing
             or (self.tells_mass and self.misfit <= POOR)
         ):
             return value, low, high

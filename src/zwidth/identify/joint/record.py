@@ -64,7 +64,7 @@ class JointMotion:
 
     @property
     def resolution(self) -> float:
-        """Step of the encoder, or of what its noise amounts to [m or rad]."""
+        """Step of the encoder, or one whose even error is as large as the noise: sqrt(12) of it [m or rad]."""
         return max(self.step, self.noise * float(np.sqrt(12.0)))
 
     @property

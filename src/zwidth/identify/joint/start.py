@@ -85,6 +85,7 @@ def force_balance_rows(windows: Windows, size: int, step: float, moving: float) 
     samples = np.concatenate(starts)[:, None] + np.arange(size)
     last = len(windows.position) - 1
     moved = windows.position[np.minimum(samples + reach, last)] - windows.position[np.maximum(samples - reach, 0)]
+    # 1.5 steps: one may be rounding
     direction = np.where(np.abs(moved) > 1.5 * step, np.sign(moved), 0.0)
     kept = np.mean(direction != 0.0, axis=1) >= moving
     samples, direction, T = samples[kept], direction[kept], T[kept]
@@ -252,6 +253,7 @@ def _guesses(windows: Windows, numbers: JointNumbers, step: float) -> Iterator[J
     values += [_numbers_of_bursts(windows, share) for share in LEVELS] if windows.driven else []
     for given in values or [np.eye(len(sizes))[MASS] * sizes]:
         guess = given[: len(numbers.values)].copy()
+        # a balance may find masses and friction below 0
         guess[MASS] = max(guess[MASS], 1e-3 * sizes[MASS])
         guess[VISCOUS] = np.maximum(guess[VISCOUS], 0.0)
         guess[DRY] += max(-0.5 * float(np.sum(guess[DRY])), 0.0)  # their mean is not below 0
@@ -267,12 +269,14 @@ def _numbers_of_bursts(windows: Windows, share: float) -> Floats:
     turns = max(int(np.sum(signs[1:] != signs[:-1])), 1)
     T = float(np.mean(windows.period))
     burst = 0.5 * len(signs) / turns * T
+    # parts of two bursts each
     short = windows.cut(max(int(np.median(windows.length) * T / (2.0 * burst)), 1))
     travels = np.array(
         [np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)]
     )
     moved = max(float(np.quantile(travels, 0.8)), 1e-300)
-    # speeded up by the excess of force for half a burst, and slowed down by it: travel is excess burst^2 / (4 m)
+    # speeded up by the excess of force for half a burst, and slowed down by it: travel is excess burst^2 / (4 m),
+    # the excess at least a tenth of the largest force
     return np.array(
         [max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T, 0.0, 0.0, 0.0]
     )

@@ -133,6 +133,7 @@ def coherence_check(spectra: Spectra, excited: Flags, closed: bool) -> tuple[Che
     """
     into = "reference" if closed else "force"
     coherence = np.where(excited, spectra.coherence(into, "position"), 0.0)
+    # over nine lines, so that one line says nothing
     smooth = np.convolve(coherence, np.ones(9) / 9.0, mode="same") if len(coherence) > 20 else coherence
     good = np.flatnonzero((smooth > LOST) & excited)
     f = spectra.frequency
@@ -174,6 +175,7 @@ def order_check(slope: float, ratio: float, names: tuple[str, str]) -> Check:
 
     slope, ratio  of `slope_of`
     """
+    # over less than two octaves the flank of a resonance rises as steeply
     swapped = slope > RISING and ratio > 4.0
     reason = f"the response goes with frequency to the power {slope:.2g}"
     if swapped:
@@ -222,6 +224,7 @@ def sign_and_unit_checks(
     good = np.flatnonzero(excited & (coherence > TRUSTED) & (np.abs(value) > 0.0))
     if len(good) < 4:
         return []
+    # the lowest eighth of the lines, and four at least
     lowest = good[: max(4, len(good) // 8)]
     ratio = value[lowest] / own[lowest]
     size = float(np.median(np.abs(ratio)))
@@ -229,6 +232,7 @@ def sign_and_unit_checks(
     f = spectra.frequency[lowest]
     where = f"from {f[0]:.3g} to {f[-1]:.3g} Hz"
     checks = []
+    # within 45 degrees of the opposite phase
     if cosine < -0.7:
         reason = f"{where} the position moves against the force; turn the sign of one of the columns"
         checks.append(Check("sign", False, reason))
@@ -333,6 +337,7 @@ def amplitude_check(
     count = 2 * int(np.count_nonzero(known))
     relative = float(np.median(np.abs(of_small.value[known] / of_large.value[known] - 1.0))) if count else 0.0
     forces = f"{size[small]:.3g} and {size[large]:.3g} {sources[0].channels.force.partition('_')[2]}"
+    # by chance alone the sum has the mean `count` and the variance 2 `count`
     if count == 0 or difference < count + SURE * np.sqrt(2.0 * count):
         return Check(
             "amplitude", True, f"the response is the same at {forces} (standard deviations of the force)"
@@ -356,11 +361,13 @@ def _coulomb_friction(a: RecordResponse, b: RecordResponse, known: Flags, force_
 
     a, b  their responses;   known  bands of both;   force_a, force_b  amplitudes F [N]
 
-    |1/P_a| - |1/P_b| along the direction of i z^d:   Im (1/P_a - 1/P_b) = 4 f_c/pi (1/X_a - 1/X_b),  X = |P| F
+    The damper 4 f_c/(pi w X) is 4 f_c/(pi X) in the imaginary part of 1/P, X = |P| F; hold and delay, which turn
+    its phase, are left out:   Im (1/P_a - 1/P_b) = 4 f_c/pi (1/X_a - 1/X_b)
     """
     Pa, Pb = a.value[known], b.value[known]
     per_friction = 4.0 / np.pi * (1.0 / (np.abs(Pa) * force_a) - 1.0 / (np.abs(Pb) * force_b))
     found = np.imag(1.0 / Pa - 1.0 / Pb)
+    # by the noise of 1/P_a, of the smaller force
     weight = 1.0 / (a.deviation[known] / np.abs(Pa) ** 2) ** 2
     return float(np.sum(weight * per_friction * found) / max(float(np.sum(weight * per_friction**2)), 1e-300))
 

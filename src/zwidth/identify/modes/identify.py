@@ -341,6 +341,7 @@ def _model_and_damping(
     found = None
     if numbers is not None:
         found = fit_model(response, numbers, modal, period)
+        # where the device's model explains more, its modes are tried as well
         if found.misfit < modal.misfit:
             loop = numbers.loop_of(found.values)
             modal = min(modal, modes_of(response, loop), key=lambda fit: fit.criterion)
@@ -449,6 +450,7 @@ class FittedData:
     @property
     def line(self) -> float:
         """Distance of two lines of the transform of the longest stretch [Hz]."""
+        # a stretch whose end is unseen is fitted without it
         share = 1.0 - (1.0 / UNSEEN if self._ends_unseen else 0.0)
         return 1.0 / (self.survey.longest * share * self.period)
 
@@ -557,6 +559,7 @@ class FittedData:
         # a stretch behind the first may be one that no fit is to see: then all that are fitted are taken
         loudest = None if self._whole_stretches_unseen and self.survey.loudest[1] else self.survey.loudest
         modes = None
+        # few modes first: bands are laid anew about their poles before more are looked for
         for most in (1, 3, MOST_MODES):
             where = self.bands_about(poles, UNKNOWN)
             if len([band for band in where if not band.single]) < 4:

@@ -98,6 +98,7 @@ def bands(
         for a, b in zip(edges, ends, strict=True)
     ]
     reached = laid[-1].high if laid else low
+    # less than half a least band is left out at the top
     while reached < high - 0.5 * least:
         most = min(max(WIDEST * reached, least), max(OF_NYQUIST * nyquist, least))
         # poles here that are narrower than the least band, about which lines are kept one by one
@@ -224,6 +225,7 @@ class BandedRecord:
 
     def _add_single(self, b: int, band: FrequencyBand, lines: Lines, a: int, e: int) -> None:
         """Add the lines a to e - 1 of a stretch to band b one by one, less what transients of its poles can be."""
+        # what is projected out, and a few lines more
         if e - a < SMOOTH + 5 + 4 * len(band.poles) or (self.reference and not band.search):
             return  # feedback would bias single lines: they serve to look for the poles alone
         f, U, Y = lines.frequency[a:e], lines.force[a:e], lines.position[a:e]
@@ -445,6 +447,7 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
         )
         factor = np.abs(np.exp(2j * np.pi * middle[i] * record.period) - 1.0) ** 2
         at_middle.append(at_zero @ values[i] / (np.exp(2j * np.pi * middle[i] * record.period) - 1.0) ** 2)
+        # half the variance in each component
         deviation.append(np.sqrt(0.5 * sigma2 * float(np.sum(spread))) / factor)
     theta, single = [2.0 * np.pi * record.period * nodes.ravel()], []
     start = nodes.size
@@ -524,6 +527,7 @@ def _noise(middle: Floats, remainders: Floats, counts: Floats, period: float) ->
         weights, about = counts[part], x[part] - np.average(x[part], weights=counts[part])
         spread = float(np.sum(weights * about**2))
         slope = float(np.sum(weights * about * level[part])) / max(spread, 1e-300)
+        # weighted by the counts a slope has the variance 1/spread
         slope = slope if abs(slope) * np.sqrt(spread) > CLEAR else 0.0
         smooth[i] = np.average(level[part], weights=weights) + slope * (
             x[i] - np.average(x[part], weights=weights)

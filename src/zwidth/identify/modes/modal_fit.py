@@ -85,7 +85,7 @@ class ModalFit:
 
     @property
     def clear_rates(self) -> Floats:
-        """w of the modes that are peaks of the response, ascending [rad/s]."""
+        """w of the modes that are peaks of the response, making more than half of it there, ascending [rad/s]."""
         rates, shift = self.rates, 0 if self.base == "grounded" else 1
         # size of the response at a resonance, by the mode alone and of all modes
         by_mode = np.abs(self.residues[shift : shift + self.count]) / (2.0 * self.ratios * rates**2)
@@ -188,6 +188,7 @@ def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
     A[n:, n:] = -np.linalg.solve(plant.mass, plant.damping)
     poles = np.linalg.eigvals(A)
     low, fast = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
+    # 1e-9: real to rounding; a pole of 0 is no mode
     real = np.sort(
         np.abs(poles[(np.abs(poles.imag) < 1e-9 * np.abs(poles)) & (np.log(np.abs(poles) + 1e-300) > low)].real)
     )
@@ -334,6 +335,7 @@ def modal_intervals(data: RecordResponse, fit: ModalFit, *, profiled: bool = Tru
         lower=low,
         upper=high,
         profiled=profiled and fit.count <= PROFILED,
+        # the residues were fitted, too, and take as many residuals
         effective_count=rows * (rows - len(fit.residues)) / rows,
     )
     step = 1e-6
@@ -398,6 +400,7 @@ def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coup
         columns.append(_Column(0.5 * float(np.exp(vector[1])), 0.0))
     modes = list(zip(np.exp(vector[before::2]).tolist(), np.exp(vector[before + 1 :: 2]).tolist(), strict=True))
     columns += [_Column(zeta * w, w**2, loss=(w, zeta) if damping == "hysteretic" else None) for w, zeta in modes]
+    # all faster modes as one, critically damped
     fast = FASTEST * np.pi / period
     columns.append(_Column(fast, fast**2))
     if coupled:

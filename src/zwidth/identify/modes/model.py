@@ -151,6 +151,7 @@ def _delay_quantities(device: Device, controller: Controller, full: Sequence[str
             Quantity("sum of delay, current loop and filter", "s", float(total), float(total), False, (entry,))
         )
     if LAG in full:
+        # above 0, as it varies by its logarithm
         first = max(float(lag), 0.05 * T)
         found.append(Quantity("time constant of the actuator", "s", float(lag), first, True, ((LAG, 1.0, 0.0),)))
     return found
@@ -281,6 +282,7 @@ def _elements(
             found.append((f"between coordinates {i} and {j}", shape, entries, value))
         ground = float(matrix[i, i]) if name == "mass" else float(matrix[i].sum())
         alone = name == "damping" and n == 1 and not lossy
+        # ten times: a sum over a row of the matrix is rounded more
         if abs(ground) > least * 10.0 or alone:
             shape = np.zeros((n, n))
             shape[i, i] = 1.0
@@ -294,7 +296,8 @@ def _elements(
 
 
 def _first_damping(plant: Plant, shape: Floats) -> float:
-    """A damper to start from [N s/m]: 2 % of critical damping of the masses and springs at its coordinates.
+    """A damper to start from [N s/m]: 2 % of critical damping of the masses and springs at its coordinates, as
+    if they vibrated at 1 rad/s at least.
 
     shape  (n, n) what one unit of it is in the damping matrix
     """
@@ -323,6 +326,7 @@ def _hand_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> S
     for key in keys:
         name, unit = HAND[key]
         value = float(getattr(operator, _attribute(key)) or 0.0)
+        # 1 where the file has 0: it varies by its logarithm
         quantities.append(Quantity(name, unit, value, value or 1.0, True, ((f"operator.{key}", 1.0, 0.0),)))
 
     def loop_of(values: Floats) -> Loop:

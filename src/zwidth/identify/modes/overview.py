@@ -122,6 +122,7 @@ def _fit_part_covers(powers: Sequence[Floats]) -> bool:
     else:
         fitted = np.sum([power[0] for power in powers], axis=0)
         total = np.sum([power.sum(axis=0) for power in powers], axis=0)
+    # bands that are excited
     counted = total > 1e-4 * np.max(total)
     return bool(np.all(fitted[counted] >= COVERED * total[counted]))
 
@@ -136,10 +137,13 @@ def peak_poles(spectra: Spectra) -> Complexes:
     coherence = spectra.coherence("force", "position")
     size = np.log(np.maximum(np.abs(value), 1e-300))
     size = np.where(coherence > COHERENT, size, size[coherence > COHERENT].min(initial=0.0))
+    # 0.7 of a logarithm: peaks twice as high as what is beside them
     lines, properties = find_peaks(size, prominence=0.7, width=1, rel_height=0.5)
     order = np.argsort(properties["prominences"])[::-1][:8]
     step = 1.0 / (spectra.length * spectra.period)
     f, width = spectra.frequency[lines[order]], np.maximum(properties["widths"][order], 1.0) * step
+    # half of what a pole with a peak of this width at half power has: at half the prominence of a logarithm a
+    # peak is wider
     return np.asarray(-np.pi * np.minimum(width, 0.2 * f) * 0.5 + 2j * np.pi * f)
 
 
@@ -171,6 +175,7 @@ def period_of(force: Floats) -> int:
         )
         + 1
     )
+    # a period of fewer than 16 samples is no multisine's
     for lag in rises[:50]:
         if lag >= 16 and np.mean((u[lag:] - u[:-lag]) ** 2) < SAME * power:
             return int(lag) if n >= FEWEST_PERIODS * lag else 0

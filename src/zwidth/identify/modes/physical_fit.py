@@ -77,6 +77,7 @@ def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period
     says little of a mode, several minima are hardly different, and all of them set the ends of intervals.
     """
     low, high = _search_bounds(model, period)
+    # 1e-300: the logarithm of 0, which is clipped to the bounds
     start = np.clip(model.vector(np.maximum(model.start, 1e-300)), low, high)
     # the delay begins at that of the modes
     timed = [i for i, one in enumerate(model.quantities) if not one.positive and one.unit == "s"]
@@ -102,6 +103,7 @@ def _search_bounds(model: SampledModel, period: float) -> tuple[Floats, Floats]:
         if one.positive:
             low[i], high[i] = np.log(one.start) - FAR, np.log(one.start) + FAR
         else:
+            # a delay of up to 20 samples, or four times the file's
             low[i], high[i] = 0.0, max(20.0 * period, 4.0 * one.start) if one.unit == "s" else np.inf
     return low, high
 

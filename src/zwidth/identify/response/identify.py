@@ -338,6 +338,7 @@ def _share_explained(response: Response, unseen: SweepBlocks, length: int, perio
         window = np.hanning(len(moved))
         U, Y = np.fft.rfft(force[: len(moved)] * window), np.fft.rfft(moved * window)
         f = np.fft.rfftfreq(len(moved), period)
+        # 0.99: between two frequencies that are both reliable
         inside = (f >= known[0]) & (f <= known[-1]) & (np.interp(f, response.frequency, good) > 0.99)
         predicted = np.interp(f, known, shifted.real) + 1j * np.interp(f, known, shifted.imag)
         missed += float(np.sum(np.abs(Y - predicted * U)[inside] ** 2))
@@ -424,6 +425,7 @@ def _check_units(device: Device, f: Floats, size: Floats) -> list[Check]:
     theta = np.minimum(2.0 * np.pi * f * loop.period, np.pi)
     times = size / np.abs(sampled_response(loop, theta))
     for factor, unit in FACTORS_LINEAR.items():
+        # NEAR^2: each frequency by itself differs more than a median
         if np.mean(np.maximum(times / factor, factor / times) < NEAR**2) > ALIKE:
             what = f"is the position in {unit}" if unit.endswith("s") else f"is {unit}"
             reason = f"the response is {np.median(times):.4g} times that of the device file: {what}?"

@@ -233,6 +233,7 @@ def _check_hysteresis(strokes: Strokes) -> Check:
     (_, friction, _), squares, *_ = np.linalg.lstsq(columns, strokes.torque, rcond=None)
     spread = float(np.sqrt(squares[0] / len(strokes.sign))) if len(squares) else 0.0
     span = float(np.ptp(strokes.torque))
+    # beyond four of its standard errors, and a thousandth of the range
     if friction < -max(4.0 * spread / np.sqrt(len(strokes.sign)), 1e-3 * span):
         return Check(
             "hysteresis",

@@ -121,6 +121,7 @@ def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> Sp
     for _ in range(len(EXTENSIONS) + 1):
         good &= ~_far_outliers(fit.residuals, good)
         kept = good & ~_across_kink(fit, strokes)
+        # too few to fit: bins across a kink, too
         if np.count_nonzero(kept) <= len(fit.names):
             kept = good
         fit = _fit_parameters(fit.names, strokes, resolution, kept, fit)
@@ -185,6 +186,7 @@ def _across_kink(fit: SpringFit, strokes: Strokes) -> Flags:
     half_play = 0.5 * fit["play"]
     kinks = (-half_play, half_play) if half_play else (-fit["preload"] / fit["forward"],)
     d = fit.bend(strokes)
+    # 1.2: a margin for the error of the kink
     over = np.any([np.abs(d - kink) <= 1.2 * strokes.reach for kink in kinks], axis=0)
     return np.asarray(over & (strokes.samples > 1) & ("backward" in fit.names))
 
@@ -431,7 +433,7 @@ def without_spikes(values: Floats, resolution: Resolution) -> Flags:
         return np.ones(len(values), dtype=bool)
     padded = np.pad(values, 2, mode="edge")
     middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
-    usual = float(np.median(np.abs(np.diff(values))))  # a turn of the motion is off by two steps
+    usual = float(np.median(np.abs(np.diff(values))))  # a turn of the motion is off by two steps: twice that
     limit = max(SPIKE_NOISE * resolution.noise, SPIKE_COUNTS * resolution.step, 1e-9 * float(np.ptp(values)))
     return np.abs(values - middle) <= limit + 4.0 * usual
 

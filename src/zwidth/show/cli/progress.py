@@ -105,6 +105,7 @@ class _Lines:
         """Print a line, unless one was printed a moment ago: the thread and the computation may come together."""
         with self._lock:
             now = monotonic()
+            # 0.99: clocks may wake the thread a little early
             if now - self._printed < 0.99 * self._pause or (not self._of and self._busy()):
                 return
             self._printed, self._pause = now, LONGER * self._pause

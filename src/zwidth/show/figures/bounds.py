@@ -248,7 +248,8 @@ def _nearest_distances(points: Floats, others: Floats) -> Floats:
 def _largest_in_view(bounds: Sequence[Bound], chart: StabilityChart | None) -> tuple[float, float]:
     """Return the largest stiffness [N/m] and damping [N s/m] of the view.
 
-    They are 20 % beyond the exact chart; without one, beyond what the conditions admit.
+    They are 20 % beyond the exact chart; without one, beyond the largest stiffness that the conditions admit, and
+    three times the damping at which one admits its largest.
     """
     if chart is not None and chart.stiffness_max > 0.0:
         return 1.2 * chart.stiffness_max, 1.2 * max(chart.damping_max, chart.damping_at_stiffness_max)

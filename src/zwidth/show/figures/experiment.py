@@ -146,6 +146,7 @@ def _default_window(
         B += [point.damping, *([] if point.edge == "tip" else ends)]
     if chart is not None and chart.regions:
         # a chart that reaches many times farther would press the points into a corner
+        # hence up to 2.5 times the points, downwards by as much more as they go up
         _, K1, B0, B1 = chart.box
         K.append(min(K1, 2.5 * max(K)) if max(K) > 0.0 else K1)
         B += [max(B0, 2.5 * min(B) - max(B)), min(B1, 2.5 * max(B)) if max(B) > 0.0 else B1]

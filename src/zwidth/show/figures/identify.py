@@ -298,6 +298,7 @@ def draw_response(ax: Axes, identification: Identification) -> None:
     f, coherence = curves["frequency_Hz"], curves["coherence"]
     magnitude = np.hypot(curves["real_m_per_N"], curves["imag_m_per_N"])
     averages = float(identification.details["averages"])
+    # 0.9: the lower end stays above 0, on a logarithmic axis
     error = np.minimum(DISK * relative_error(np.maximum(coherence, 1e-6), averages), 0.9)
     sweep = curves.get("sweep", np.ones(len(f)))
     sweeps = np.unique(sweep)

@@ -187,6 +187,7 @@ def _cut_text(motion: MechanismMotion, cut: tuple[int, float]) -> str:
     cut  axis and place, as `_cut_plane` returns them
     """
     across, place = cut
+    # NEAR: a smaller motion is rounding; 1e-12 m for a path at the origin
     moves = np.ptp(motion.position[:, across]) > NEAR * max(float(np.max(np.abs(motion.position))), 1e-12)
     return f" at {AXES[across]} = {quantity(place, 'm')}" if moves else ""
 

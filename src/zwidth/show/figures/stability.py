@@ -194,7 +194,8 @@ def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int
 
 
 def round_radii(smallest: float, most: int = 5) -> list[float]:
-    """At most `most` round numbers strictly between the smallest radius and 1, descending."""
+    """At most `most` round numbers strictly between the smallest radius and 1, descending, by the coarsest step
+    that gives three."""
     for step in (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005, 0.0002, 0.0001, 1e-5, 1e-6):
         # multiples of the step between 1 and the smallest radius; one within a thousandth of a step of it is not
         count = int(np.ceil((1.0 - smallest) / step - 1e-3)) - 1
@@ -271,6 +272,7 @@ def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
     pairs = []
     for i in range(len(ends)):
         for j in range(i + 1, len(ends)):
+            # 1e3: K above 0 by a thousandth of the edge's extent
             together = abs(K[i] - K[j]) <= near[0] and abs(B[i] - B[j]) <= near[1]
             if together and abs(f[i] - f[j]) > 1e-6 * nyquist and K[i] > 1e3 * near[0] and B[i] >= 0.0:
                 low, high = sorted((float(f[i]), float(f[j])))

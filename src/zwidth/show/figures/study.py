@@ -558,7 +558,7 @@ def _parallel_axis(column: Any, values: NDArray[Any]) -> ParallelAxis:
     logarithmic = low > 0.0 and (high / low > style.WIDE**2 if measured else column.attrs.get("scale") == "log")
     exponent = exponent_of(max(abs(low), abs(high))) if measured and unit else 0
     if scaled(exponent, unit).startswith("10") and 0.01 <= max(abs(low), abs(high)) < 1e4:
-        exponent = 0
+        exponent = 0  # short enough without a power of ten
     locator: Any = LogLocator(subs=(1.0, 2.0, 5.0)) if logarithmic else MaxNLocator(8, steps=[1, 2, 5, 10])
     levels = [v for v in locator.tick_values(low, high) if low <= v <= high]
     scale = np.log if logarithmic else np.asarray

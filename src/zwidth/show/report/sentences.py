@@ -99,6 +99,7 @@ def largest_stiffness(facts: Facts) -> str:
     if not facts.renders:
         return f"{start} renders no wall: {NO_WALL}."
     stiffness = quantity(facts.base.stiffness_max, "N/m")
+    # no damping, to rounding
     if facts.base.damping <= 1e-9 * facts.chart.box[3]:
         return (
             f"{start} renders walls of up to {stiffness}, at no virtual damping; "
@@ -293,7 +294,8 @@ def models(facts: Facts) -> str:
 
 
 def difference(ratio: float) -> str:
-    """A ratio in words before "the device": "2.000 % above", "just as", "16.00 times that of"."""
+    """A ratio in words before "the device": "2.000 % above", "16.00 times that of"; "just as" where four digits do
+    not differ."""
     if ratio >= 3.0:
         return f"{number(ratio)} times that of"
     if abs(ratio - 1.0) < 5e-4:

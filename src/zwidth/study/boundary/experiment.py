@@ -195,7 +195,8 @@ def _stability_trial(
     factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
     seed: int = 0,
 ) -> StabilityTrial:
-    """The trial of a plan, with its disturbance, speed and push times `factors`, in this order."""
+    """The trial of a plan, with its disturbance, speed and push times `factors`, in this order; a reflex acts from
+    half the push on."""
     disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
     reflex = None
     if plan.reflex and operator is not None:

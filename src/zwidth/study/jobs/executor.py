@@ -377,6 +377,7 @@ def batch_size(compute: Callable[[int, int], object], count: int, slots: int) ->
     count    number of all cells
     slots    how many batches are computed at once
     """
+    # four batches for each place, so that places end about together
     most = max(1, min(MOST, count // max(SHARES, 4 * slots)))
     size, place, failed = 2, 0.0, 0
     while size <= most and most > 1 and failed < FAILED_TRIALS:

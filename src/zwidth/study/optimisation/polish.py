@@ -292,6 +292,7 @@ def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement
     lengths = np.abs(tried - one.shares).max(axis=1)
     better = bool(gains[best] > 0.0)
     if one.probing:
+        # twice the way that helped; else half of the smallest probe
         one.probing = 2.0 * float(lengths[best]) if better else one.probing * PROBES[-1] / 2.0
         one.done = one.probing < SMALLEST or (better and gains[best] < ROUNDING)
     else:
@@ -300,6 +301,7 @@ def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement
         # the best joins the bundle if it is better, and so does that nearest one, if there is one
         each = [best] * better + [beyond] * (beyond >= 0)
         one.joining = [(tried[n], judged[n : n + 1]) for n in each if np.isfinite(judged.costs(problem)[n]).all()]
+        # `bend` becomes twice what the nearest vain trial violates, and never less than a quarter of itself
         bends = np.minimum(violated, 1.0) / lengths**2
         one.bend = max(0.25 * one.bend, 2.0 * float(bends[beyond])) if beyond >= 0 else 0.25 * one.bend
         one.reach = float(lengths[beyond]) if beyond >= 0 else min(2.0 * float(lengths[0]), REACH)

@@ -297,10 +297,12 @@ def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
     free, operators = family.free, max(len(family.operators), 1)
     count = max(int(members * (1.0 - REFINING)) // operators, 1) if free else 1
     shares = [np.full(len(free), 0.5)]
+    # all corners, where they leave half of the members to the inside
     if 2 ** len(free) <= count // 2:
         shares += [np.array(corner, dtype=float) for corner in product((0.0, 1.0), repeat=len(free))]
     if free and count > len(shares):
         sobol = qmc.Sobol(len(free), scramble=True, seed=seed)
+        # a power of two of them, and more than are wanted
         inside = sobol.random_base2(int(np.ceil(np.log2(count))) + 1)
         if len(shares) == 1:  # too many corners: those nearest the first points
             corners = np.unique(np.round(inside), axis=0)

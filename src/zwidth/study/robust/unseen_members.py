@@ -166,6 +166,7 @@ def sample_walls(chart: RobustChart) -> Floats:
         count = max(int(np.ceil(EDGE_WALLS * along[-1] / total)), 2)
         at = np.linspace(0.0, along[-1], count + 1)[1:]
         points = np.column_stack([np.interp(at, along, x) for x in (arc.stiffness, arc.damping)]) / size
+        # a thousandth of the arc behind each point, for the direction of the edge there
         behind = [np.interp(at - 1e-3 * at[-1], along, x) for x in (arc.stiffness, arc.damping)]
         ahead = points - np.column_stack(behind) / size
         # the stable side: a step to the left of the edge is a step inside
@@ -373,6 +374,7 @@ def violating_members(
     starts = [(charted[start], wall) for wall, binding in _searched_walls(chart) for start in binding]
     for member, radius in _worst_members(radii, starts):
         if radius > 1.0 + EXCEEDS and member not in charted:
+            # members within 1e-6 of each other count as one
             rounded = radii.family.member(member.operator, np.round([member.shares[k] for k in free], 6))
             found[rounded] = max(radius, found.get(rounded, 0.0))
     return sorted(found, key=lambda member: -found[member])
@@ -380,7 +382,7 @@ def violating_members(
 
 def _searched_walls(chart: RobustChart) -> list[tuple[Wall, tuple[int, ...]]]:
     """Walls of the edge to search from, with the members that bind there: the stiffest, where the binding member
-    changes, and the middles of the longest arcs."""
+    changes, and the middles and quarters of the four arcs with the most points."""
     walls: list[tuple[Wall, tuple[int, ...]]] = []
     if chart.members_at_stiffness_max:
         walls.append(((chart.stiffness_max, chart.damping_at_stiffness_max), chart.members_at_stiffness_max))

@@ -165,7 +165,7 @@ def _changed_loops(
 
 
 # First steps in shares of the scale: smaller where the function changes within a step, larger against rounding.
-FIRST: Final = (2e-3, 1e-4, 5e-6, 1e-2, 5e-2)
+FIRST: Final = (2e-3, 1e-4, 5e-6, 1e-2, 5e-2)  # first steps in shares of the scale, as they are tried in turn
 LEVELS: Final = 3  # least number of halvings
 MOST: Final = 9  # largest number of halvings, where the function changes fast
 ENOUGH: Final = 1e-10  # error of the derivative times the scale below which no more halvings are made

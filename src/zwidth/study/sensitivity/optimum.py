@@ -36,10 +36,10 @@ from zwidth.resources import in_chunks
 Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
 
 # If a Newton step of K'(angle) is longer than this share of the angle, the wall is not a smooth maximum.
-AT_MAXIMUM: Final = 1e-5
+AT_MAXIMUM: Final = 1e-5  # share of the angle within which a Newton step finds the maximum
 
 # Extreme points closer than this share of the stable set's size are one.
-APART: Final = 1e-3
+APART: Final = 1e-3  # shares of the set's size between two different peaks
 
 # Kinds of pieces of the edge.
 CURVE, LINE, AXIS, END = range(4)
@@ -117,6 +117,7 @@ def _stiffnesses(
     for i in range(first, last):
         if loops.section_count[i] == 0:
             continue
+        # 1.0: radius of the circle
         fill_loop_polynomials(loops, i, 1.0, circle, polynomials)
         stiffness = 0.0
         for k in range(len(pieces.kind)):
@@ -177,6 +178,7 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
         raise NoAnswerError(
             "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
         )
+    # n = (1, 0): r is K itself, at the angle held fixed or at the end of the curve
     single = _Piece(CURVE if inside else END, (inside or real)[0], np.array([1.0, 0.0]))
     return Optimum(
         peak, "smooth maximum" if inside else "end of the curve", _edge_pieces(peak, [single], np.ones(1))
@@ -262,6 +264,7 @@ def second_peak_stiffness(chart: StabilityChart) -> float:
     top = np.array([chart.stiffness_max, chart.damping_at_stiffness_max])
     for ring in chart.regions:
         walls = _cut_at_axis(ring[:-1])
+        # 1e-9: K > 0 beyond rounding
         height = np.where((walls[:, 1] >= 0.0) & (walls[:, 0] > 1e-9 * size[0]), walls[:, 0], -np.inf)
         peaks = np.isfinite(height) & (height > np.roll(height, 1)) & (height >= np.roll(height, -1))
         for wall in walls[peaks]:

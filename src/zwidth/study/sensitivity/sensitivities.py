@@ -370,6 +370,7 @@ def _with_number_changed(
     if steps == PERIOD:
         controller, changed = (
             replace(controller, sampling_period=T + change),
+            # 0.0: no later command
             changed_port(port, 0.0, T + change),
         )
     elif steps in DELAYS:
@@ -399,6 +400,7 @@ def _relative_slope(
     else:
         below = stiffness(-step)
         slope, bend = (above - below) / (2.0 * step * largest), abs(above - 2.0 * here + below) / (step * largest)
+        # a guess: two points and the middle tell nothing of a third derivative
         error = STEP * bend
     return slope, error, bend
 

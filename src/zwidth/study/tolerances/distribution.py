@@ -22,7 +22,7 @@ CUT: Final = (
 )
 SPAN_OF_95: Final = 1.959963984540054  # standard deviations on either side of the middle that hold 95 %
 # Shares of a draw keep away from 0 and 1: an end of a distribution may be a value that a device cannot have.
-LEAST_SHARE: Final = 2.0**-53
+LEAST_SHARE: Final = 2.0**-53  # stands for 0, at which a distribution with tails is infinite
 QUANTILES: Final = 4096  # that moments are found from
 
 
@@ -202,6 +202,7 @@ class Tolerance:
 
     def axis(self, values: ArrayLike) -> Axis:
         """The axis of a study whose n-th design has the n-th of these values (n,)."""
+        # 1.0: the draws as they are, by the arithmetic of narrower ones
         drawn: Floats = self.distribution.narrowed(values, 1.0)
         return Axis(self.key, tuple(drawn.tolist()), ties=self.ties, unit=self.unit)
 

@@ -75,6 +75,7 @@ def quantile_ranks(share: float, count: int) -> tuple[int, int, int]:
     # P(fewer than l below) <= 0.025, P(u or more below) <= 0.025
     below = binom.cdf(np.arange(-1, count + 1), count, share)  # [j] = P(at most j - 1)
     low = int(np.flatnonzero(below[: count + 1] <= OUTSIDE)[-1])
+    # 1e-15: rounding of 1 - below
     high = int(np.flatnonzero(1.0 - below <= OUTSIDE + 1e-15)[0]) if 1.0 - below[count] <= OUTSIDE else count + 1
     return estimate, low, high
 

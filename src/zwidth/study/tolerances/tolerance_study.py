@@ -247,6 +247,7 @@ def _coverage(
         question.study_of(_device_axes(question, values), [WALL_IS_STABLE] if question.has_wall else [])
     )
     first = EdgeJob(job, np.empty(0))
+    # 1 N s/m where none of them has a stable wall with B > 0
     top = ABOVE * highest_damping(first, TRIED) or 1.0
     dampings, intervals = np.empty(0), np.empty((question.samples, 0, MOST_INTERVALS, 2))  # as of `Coverage`
     # lines to compute next, number of rounds of finer lines, and of all rounds

@@ -45,8 +45,8 @@ POSTURES: Final = 3  # of the lattice, along each axis of a cell
 # Of the lattice, along each component of a direction: by dimensions, for one sector a face and for smaller ones
 DIRECTIONS: Final = {2: (17, 9), 3: (7, 5)}
 # A lattice is halved until no limits are narrowed by more than this share of the widest range, or so often
-FINE: Final = 0.05
-HALVINGS: Final = 2
+FINE: Final = 0.05  # share of the range lost to narrowing, up to which a lattice is fine enough
+HALVINGS: Final = 2  # of the lattice's spacing, at most
 SEARCHED: Final = 32  # bands in which the largest stiffness of a cell is looked for
 ROUND: Final = 64  # samples in a round of the attack, for each hand
 QUIET: Final = 4  # rounds without a finding that end the attack
@@ -64,7 +64,7 @@ ROUNDING: Final = 1e-9  # of a root: at next to no stiffness one lies at 1
 NEARBY: Final = 0.15  # share of a cell, or a sector, by which samples beside the tightest differ from it
 # A band begins at this share of the largest stiffness instead of 0: a device that stands nowhere has a root at
 # z = 1 without a wall, which is no edge of its walls
-NOTHING: Final = 1e-9
+NOTHING: Final = 1e-9  # share of the largest stiffness that stands for K = 0
 BAND_OVERLAP: Final = 1e-6  # share by which a band of stiffnesses reaches into its neighbours
 DIFFERENT: Final = "the walls differ too much within the cell; use smaller cells"
 NOTHING_COMMON: Final = "no range of damping is stable in all of the cell's postures and directions"

@@ -35,7 +35,7 @@ AT_ONCE: Final = 256  # loops whose chords are in memory at full length
 # Places in a chord: K and B of its first and its last wall, and how far the edge may lie beside it in K and in B.
 K0, B0, K1, B1, SAG_K, SAG_B = range(6)
 # A chord between two samples lies an eighth of a second difference beside its curve; twice that is allowed.
-SAG: Final = 0.25
+SAG: Final = 0.25  # of the largest second difference: twice that of a parabola, 1/8
 RING_SAG: Final = 1e-6  # of a ring's extent: its chords stay this close to the edge (`chart.tracer.CHORD`)
 STRAIGHT: Final = 1e-12  # of a ring's extent: along chords that change less the edge does not
 
@@ -175,6 +175,7 @@ def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
         if arcs.kind[k] == PAIR:
             n = _add_curve(memory, k, out, n)
         else:
+            # lines of real roots and the axis are straight: no sag
             n = _add_chord(out, n, arcs.first[k, 0], arcs.first[k, 1], arcs.last[k, 0], arcs.last[k, 1], 0.0, 0.0)
         if n < 0:
             return -1
@@ -240,7 +241,7 @@ def _add_chord(
 
 GAPS: Final = 4  # stable intervals of damping kept of a band: the longest
 # Where in the band the ray runs: at no special place, so that it passes no corner; both have to agree.
-PROBES: Final = (0.4871, 0.3413)
+PROBES: Final = (0.4871, 0.3413)  # shares of a band at which walls are tried, no special ones
 
 
 def stable_damping_intervals(edges: LoopEdgeChords, bands: Floats) -> Floats:
@@ -352,6 +353,7 @@ def common_interval(intervals: Floats) -> tuple[float, float]:
 
     intervals  (N, GAPS, 2) of each loop, nan behind the last
     """
+    # no more common intervals than the loops have together
     room = np.empty((2, GAPS * max(len(intervals), 1) + 1, 2))
     low, high = _common(np.ascontiguousarray(intervals), room)
     return float(low), float(high)

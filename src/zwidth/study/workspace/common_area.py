@@ -172,6 +172,7 @@ def nonnegative_region(x: Floats, y: Floats, margin: Floats) -> Any:
     import shapely
 
     finite = np.abs(margin[np.isfinite(margin)])
+    # infinities count as twice the largest finite margin
     most = 2.0 * float(finite.max(initial=0.0)) or 1.0
     clipped = np.ma.masked_invalid(np.clip(margin, -most, most))  # masks nan, which clip keeps
     generator = contourpy.contour_generator(

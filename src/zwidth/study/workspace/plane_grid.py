@@ -238,6 +238,7 @@ def _check_intersection(normal: Floats, point: Floats, reach_normal: Floats | No
     if reach_normal is None:
         return
     known, k = reach.positions, int(np.argmax(np.abs(reach_normal)))
+    # a cosine, to the square of the sine PARALLEL
     aligned = bool(abs(reach_normal[k]) > 1.0 - PARALLEL**2)
     plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
     where = (
@@ -287,6 +288,7 @@ def rounded_outwards(low: float, high: float) -> tuple[float, float]:
         return low, high
     power = floor(log10(high - low))
     per_metre = ROUND * 10.0**-power  # we divide by it: multiplying by its inverse would round the decimals
+    # within 1e-6 of a multiple an end stays there
     return floor(low * per_metre + 1e-6) / per_metre, ceil(high * per_metre - 1e-6) / per_metre
 
 
@@ -317,5 +319,6 @@ def _line_coordinates(low: float, high: float, count: int) -> Floats:
     k = np.arange(count)
     x = (low * k[::-1] + high * k) / (count - 1)
     size = max(abs(low), abs(high))
+    # the short decimal, where it is the coordinate to rounding
     decimal = np.round(x, DIGITS - 1 - floor(log10(size)))
     return np.asarray(np.where(np.abs(decimal - x) <= 2.0 * np.spacing(size), decimal, x))
