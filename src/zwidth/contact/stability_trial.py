@@ -198,8 +198,8 @@ def _responses(trial: StabilityTrial, walls: Floats, samples: int) -> list[TimeR
 
 def _bound(trial: StabilityTrial, stiffness: float) -> float:
     """Reading from the wall at which a run stops [m]: many times what the disturbance and the push move."""
-    # the push's deflection of the wall, and the way at the start's speed in 1024 samples; 20: a wall that holds
-    # overshoots the deflection by about as much again
+    # the push's deflection of the wall, and the way at the start's speed in 1024 samples; 20 times, far beyond
+    # what a wall that holds overshoots
     pushed = abs(trial.hand.push) / max(abs(stiffness), 1e-300)
     thrown = abs(trial.speed) * 1024 * trial.loop.period
     return float(BOUND_FACTOR * (trial.disturbance + thrown) + 20.0 * pushed)
