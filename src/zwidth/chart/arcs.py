@@ -168,6 +168,7 @@ class Arcs:
     @cached_property
     def rings(self) -> tuple[range, ...]:
         """Each ring's arcs, as a range of indices in the order of its walk."""
+        # a ring's last arc goes on with its first, which does not come after it
         ends = (np.flatnonzero(self.next_arc <= np.arange(len(self))) + 1).tolist()
         return tuple(range(low, high) for low, high in zip([0, *ends][:-1], ends, strict=True))
 

@@ -135,6 +135,7 @@ def end_value(
     elif at == np.inf:
         drawn = beside / END_MARGIN
     else:
+        # towards a neighbour at t = 0 or inf the step counts as t itself
         step = (1.0 if beside == np.inf else -1.0) * at if beside in (0.0, np.inf) else beside - at
         drawn = at + END_MARGIN * step
     if not 0.0 < drawn < np.inf:  # from one end of the circle to the other without a sample
@@ -171,7 +172,7 @@ def curve_integral(
             # of two crossings first the one nearer to where the interval begins
             first_is_K = not abs(of_B - at) < abs(of_K - at)
             zero = of_K if first_is_K == nearer else of_B
-            if zero == zero:
+            if zero == zero:  # not nan: there is such a crossing
                 x, y = wall_on_circle(circle, zero)
                 x, y = (0.0, y) if zero == of_K else (x, 0.0)
                 total += _panel(circle, area, lanes, total, from_t, from_K, from_B, zero, x, y)
@@ -321,7 +322,7 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
     crossed, crossings = arcs.crossings(DAMPING)
     crossings[:, DAMPING] = 0.0
     walls = [arcs.last, arcs.first[arcs.next_arc], crossings]
-    # number of the arc, and the place on it, of each wall that is no corner
+    # number of the arc, and the place on it, of each wall that is no corner; a straight arc has one place for all
     along = list(zip(crossed.tolist(), arcs.start[crossed].tolist(), strict=True))
     for k in arcs.curved:
         arc = arcs[k]
@@ -365,6 +366,8 @@ def largest_damping(
     stable           function that tells whether a wall (K, B) is stable
     """
     corners: list[list[float]] = [*arcs.first.tolist(), *arcs.last.tolist()]
+    # corners on K = 0 but for rounding; below, K = 0+ is tested at 1e-7 of the scale, and intervals of damping
+    # shorter than 1e-9 of the largest are rounding
     stops = {0.0, *(B for K, B in corners if abs(K) <= 1e-8 * stiffness_scale)}
     stops.update(arcs.crossings(STIFFNESS)[1][:, 1].tolist())
     for k in arcs.curved:

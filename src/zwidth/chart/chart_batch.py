@@ -136,7 +136,8 @@ def fill_numbers(
     """Fill `out` for loop i with the numbers that the mask `what` asks for; none if it has no sections or its
     degree is too high.
 
-    memory  as a loop before this one has left it, or with -1 as its computer
+    memory  as a loop before this one has left it; where `sizes[COMPUTER]` is -1, no computer's number, all
+            is filled in anew
     """
     if loops.section_count[i] == 0 or degree_of(loops, i) > MOST_DEGREE:
         return

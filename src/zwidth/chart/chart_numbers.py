@@ -100,6 +100,7 @@ def read_numbers(memory: EdgeMemory) -> bool:
         read = _read_curve(memory, k, scale) if arcs.kind[k] == PAIR else _read_line(memory, k, scale)
         if not read:
             return False
+    # without a wall in the quadrant its area is rounding
     numbers[AREA] = max(numbers[AREA], 0.0) if peak[PEAK_K] > 0.0 else 0.0
     return _read_damping(memory, scale)
 
@@ -198,7 +199,7 @@ def _may_rise(memory: EdgeMemory, n: int, i: int) -> bool:
         bend = max(bend, abs(rise - (K[i - 1] - K[i - 2])))
     if i < n - 1:
         bend = max(bend, abs(K[i + 1] - K[i] - rise))
-    if n == 2:
+    if n == 2:  # one step has no second difference
         return True
     return bool(max(K[i - 1], K[i]) + 0.5 * bend >= memory.peak[PEAK_K])
 

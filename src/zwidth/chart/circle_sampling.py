@@ -177,7 +177,8 @@ def fill_features(f: CircleFactors, polynomials: LoopPolynomials, out: Features)
 
 @compiled_lean
 def _fill_distances(radius: float, out: Features) -> None:
-    """Fill in z of each singular point, and the scales of distances to the points and between them."""
+    """Fill in z of each singular point, and `scales`: of distances on the circle to the points, and the least that
+    counts, NEAREST of a point's distance to the nearest other one, z = rho (theta = 0) among these."""
     n = out.counts[0]
     for k in range(n):
         s = out.points[k]
@@ -188,7 +189,7 @@ def _fill_distances(radius: float, out: Features) -> None:
     for k in range(n):
         z = out.z[k]
         apart = (z.real - 1.0) ** 2 + z.imag * z.imag
-        if apart <= 1e-24:
+        if apart <= 1e-24:  # the point is z = rho itself
             apart = 1.0
         for j in range(n):
             dx, dy = z.real - out.z[j].real, z.imag - out.z[j].imag

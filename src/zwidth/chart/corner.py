@@ -177,7 +177,7 @@ def _corner_by_halving(memory: EdgeMemory, on: float, off: float) -> tuple[float
         else:
             beyond = middle
     K, B = wall_on_circle(circle, edge)
-    if N < 4:
+    if N < 4:  # too few roots for a second pair
         return edge, 0.0, OPEN
     # a second pair of roots is on the circle: it is what remains nearest to it without the first pair
     combine(memory.polynomials.coefficients, N, K, B, room)
@@ -189,7 +189,7 @@ def _corner_by_halving(memory: EdgeMemory, on: float, off: float) -> tuple[float
     for root in roots:
         z = divide(1.0 + root, 1.0 - root)
         if abs(abs(z) - 1.0) < nearest:
-            nearest, partner = abs(abs(z) - 1.0), abs(root.imag)
+            nearest, partner = abs(abs(z) - 1.0), abs(root.imag)  # on the circle s = i t
     one, other, met = solve_crossing(circle, edge, partner)
     if met and abs(one - edge) <= SAME_PLACE * edge:
         return one, other, SETTLED
@@ -227,7 +227,8 @@ def solve_crossing(circle: CircleFactors, one: float, other: float) -> tuple[flo
 
 @compiled_lean
 def better_conditioned(circle: CircleFactors, one: float, other: float) -> float:
-    """Of the two t of a corner the one on whose branch the wall moves less with the angle's last digits."""
+    """Of the two t of a corner the one on whose branch the wall moves less with the angle's last digits, whose
+    size is a share of the angle."""
     _, _, dK, dB = wall_with_slopes(circle, one)
     _, _, dK2, dB2 = wall_with_slopes(circle, other)
     # each in shares of the corner's slopes together, so that K and B count alike

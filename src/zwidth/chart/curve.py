@@ -70,7 +70,9 @@ def zero_between(circle: CircleFactors, of: int, line: Line, low: float, high: f
             if not abs(b - a) <= 0.5 * width:
                 x = _middle(a, b)
             width = abs(b - a)
-        if not min(a, b) + least < x < max(a, b) - least:  # also where it is no number
+        # at an end but for rounding a step inwards, so that the bracket closes; outside, or where x is no number,
+        # the middle
+        if not min(a, b) + least < x < max(a, b) - least:
             if abs(x - a) <= least or abs(x - b) <= least:
                 x = a + np.copysign(least, b - a) if abs(x - a) < abs(x - b) else b + np.copysign(least, a - b)
             else:
@@ -96,7 +98,7 @@ def undamped_stiffness(circle: CircleFactors, t: float) -> float:
     """K where the curve crosses B = 0, at the t that `zero_between` has found.
 
     Where B changes slowly along the curve, walls at two neighbouring double-precision t differ by much: the rest
-    of the way is taken along the tangent.
+    of the way is taken along the tangent, unless it is longer than rounding makes it: 1e-6 of K.
     """
     K, B, dK, dB = wall_with_slopes(circle, t)
     rest = -B * dK / dB

@@ -103,7 +103,7 @@ def _insert_sample(memory: EdgeMemory, i: int, t: float) -> None:
     stretch = 2.0 * t / (1.0 + t * t)  # dtheta / d ln t
     samples.t[i], samples.K[i], samples.B[i] = t, K, B
     samples.slope_K[i], samples.slope_B[i] = stretch * dK, stretch * dB
-    samples.flag[n], samples.corner[n] = UNKNOWN, NONE
+    samples.flag[n], samples.corner[n] = UNKNOWN, NONE  # as those of all samples still are: none need be moved
     memory.counts[SAMPLES] = n + 1
 
 
@@ -134,17 +134,20 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
         low = min(min(before, after), min(before + rise, after - next_rise))
         high = max(max(before, after), max(before + rise, after - next_rise))
         if abs(before) > ROUNDING_SIDE * (abs(a) + abs(s * K[i]) + abs(v * B[i])):
-            if high < 0.0 or low > most:
+            if high < 0.0 or low > most:  # no wall of the piece can be stable
                 return False
             # the first and the last coefficient are the lines of real roots
             line = c == 0 or c == N
             returns = returns or (line and before * after > 0.0 and low < 0.0 < high)
     if returns or _may_return(K[i], uK, wK, K[j]) or _may_return(B[i], uB, wB, B[j]):
         return True
-    # the cubic's slope goes from u over the control point m to w
+    # the cubic's slope goes from u to w; m is half of the control point between, and points as that does
     mK, mB = 1.5 * cK - 0.5 * (uK + wK), 1.5 * cB - 0.5 * (uB + wB)
     if _of_one_sign(uK, mK, wK):
         return False
+    # with slopes of K alike at both ends K may turn twice between, and no sample's slope would show its maximum:
+    # this is always halved. Else K turns once, and the curve cannot cross itself if B does not turn or slopes
+    # point one way
     return uK * wK > 0.0 or not (_of_one_sign(uB, mB, wB) or _point_one_way(uK, uB, mK, mB, wK, wB))
 
 
@@ -159,7 +162,8 @@ def _may_return(first: float, rise: float, next_rise: float, last: float) -> boo
 
 @compiled_inline
 def _of_one_sign(u: float, m: float, w: float) -> bool:
-    """Whether a quadratic with control points u, m and w (Bernstein's), the slope of a cubic, is of one sign."""
+    """Whether a quadratic with control points u, 2 m and w (Bernstein's), a cubic's slope, is of one sign for
+    certain: m by more than MARGIN of the ends."""
     if u > 0.0:
         return w > 0.0 and m > MARGIN * max(u, w)
     return u < 0.0 and w < 0.0 and m < MARGIN * min(u, w)
@@ -169,7 +173,8 @@ def _of_one_sign(u: float, m: float, w: float) -> bool:
 def _point_one_way(uK: float, uB: float, mK: float, mB: float, wK: float, wB: float) -> bool:
     """Whether all slopes of a cubic are known to point into one half plane: True if certain.
 
-    uK, uB; mK, mB; wK, wB  the control points of the slopes of K and B: at the first end, between, at the last end
+    uK, uB; mK, mB; wK, wB  the slopes of K and B at the first end, half of their control points between, and at
+                            the last end
     """
     over_K = 1.0 / max(abs(uK), abs(mK), abs(wK), 1e-300)
     over_B = 1.0 / max(abs(uB), abs(mB), abs(wB), 1e-300)
@@ -177,7 +182,8 @@ def _point_one_way(uK: float, uB: float, mK: float, mB: float, wK: float, wB: fl
     # K and B in shares of their largest slope; u, m, w are the lengths
     u, m, w = np.sqrt(uK * uK + uB * uB), np.sqrt(mK * mK + mB * mB), np.sqrt(wK * wK + wB * wB)
     least = MARGIN * max(u, m, w)
-    # the mean slope; and the mean of the three directions
+    # directions (x, y) along which each of the three may go, by more than `least`: that of their sum, and of the
+    # sum of their unit vectors
     for which in range(2):
         if which == 0:
             x, y = uK + mK + wK, uB + mB + wB

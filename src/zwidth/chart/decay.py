@@ -101,6 +101,7 @@ def _fastest_by_searches(tracer: Tracer, outlines: list[Floats], least: Floats) 
 def _refine_at_double_root(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
     """The wall with a double real root near the best one, and K, B >= least, if it decays as fast or faster, else
     the best one."""
+    # 1e-6 is the least radius tried; with two roots there is no other one beside the double one
     for reach in REACHES if tracer.degree > 2 else ():
         away = reach * (1.0 - best.spectral_radius)
         low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)
@@ -144,6 +145,8 @@ def _search_cell(tracer: Tracer, outline: Floats, least: Floats, best: FastestDe
     points = outline if least is ALL else _in_quadrant(outline)
     if not len(points):
         return best
+    # 14 points evenly spread (the last of a closed outline is its first); starts are their middles two by two,
+    # their mean and themselves
     picks = points[np.linspace(0, len(points) - 1, 15).astype(int)[:-1]]
     i, j = np.triu_indices(len(picks), 1)
     starts = np.vstack([(picks[i] + picks[j]) / 2.0, picks.mean(axis=0)[None], picks])

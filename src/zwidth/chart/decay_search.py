@@ -95,7 +95,8 @@ def _keeps_digits(loops: LoopTable, i: int, memory: EdgeMemory) -> bool:
 @compiled_lean
 def double_root_excess(loops: LoopTable, i: int, root: float, radius: float, memory: EdgeMemory) -> float:
     """Largest modulus of the other roots less the radius, of the wall with a double root at +radius (root 0) or
-    -radius (inf), which goes into `double_root`; inf where there is none."""
+    -radius (inf), which goes into `double_root`; inf where there is none. Zero at the wall that is looked for: a
+    smaller radius of the double root has another one outside."""
     fill_without_singularities(loops, i, radius, memory)
     K, B, known = curve_end(memory, root)
     memory.double_root[0], memory.double_root[1] = K, B
@@ -223,7 +224,7 @@ def _search_inside(memory: EdgeMemory, edges: int, radius: float) -> bool:
         search.extent[c] = max(high - low, 1e-300)
     for k in range(STARTS):
         search.starts[k, FASTEST_RADIUS] = np.inf
-    count = min(edges, PICKS)
+    count = min(edges, PICKS)  # of walls spread evenly over the edge: i and j are numbers a and b of these
     for a in range(count):
         for b in range(a, count):
             i, j = a * (edges - 1) // max(count - 1, 1), b * (edges - 1) // max(count - 1, 1)

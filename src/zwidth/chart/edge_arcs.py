@@ -100,7 +100,7 @@ def stable_on_left(memory: EdgeMemory, t: float) -> bool:
     """Whether the stable side is on the left for growing t: Im w > 0.
 
     Moving a root by dz = -(S dK + V dB)/p'(z) along the left normal changes |z| by an amount of the sign of
-    -Im(V conj S) = -|S|^2 Im w (Neimark's rule).
+    -Im(V conj S) = -|S|^2 Im w (Neimark's rule), with p = A + K S + B V of `loop_polynomials`, V = w S.
     """
     cc, ss, sc = half_angle(t)
     # w = value / size
@@ -184,6 +184,7 @@ def _fill_nodes(memory: EdgeMemory, root: float) -> int:
             K, B, known = line_crossing(memory)
         else:
             K, B, known = curve_end(memory, 0.0 if which == 0 else np.inf)
+        # (size 0: the wall K = B = 0 on a line with a = 0)
         size = abs(a) + abs(s * K) + abs(v * B)
         if known and np.isfinite(K + B) and (abs(a + s * K + v * B) <= ON_LINE * size or size == 0.0):
             nodes[n, 0], nodes[n, 1] = K, B

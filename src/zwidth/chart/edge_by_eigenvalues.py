@@ -55,7 +55,8 @@ SAMPLE, WALLS, FLAGS, CORNERS, PAIR_ARCS, LINE_PIECES, LINE_ARCS, JOIN = range(8
 
 
 def closed_rings(tracer: Tracer, extra_angles: Floats | None = None) -> tuple[Arcs, float]:
-    """The arcs of all closed walks round the stable set, and the share of its size to which corners are known.
+    """The arcs of all closed walks round the stable set, and the share of its size (`join`) to which corners are
+    known.
 
     extra_angles  angles to sample besides the grid
 
@@ -180,7 +181,11 @@ def _run(tracer: Tracer, memory: EdgeMemory, stage: int, value: float = 0.0) -> 
 
 
 def join(tracer: Tracer, memory: EdgeMemory, blur: float) -> bool:
-    """Join the arcs to rings; False if one of them does not close. Corners within `blur` of the size are one."""
+    """Join the arcs in memory to rings; False if one of them does not close.
+
+    blur  ends of arcs this near to each other are one corner: a share of the set's size, the largest |K T| or |B|
+          on its edge
+    """
     return _run(tracer, memory, JOIN, blur) > 0.0
 
 
@@ -271,7 +276,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, float, 
     if not len(z):
         return edge, 0.0, wall
     partner = float(np.tan(0.5 * abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))))
-    if 0.0 < partner < 1e15:
+    if 0.0 < partner < 1e15:  # a pair: a real root has tan(0) = 0, or tan(pi/2), in double precision 1.6e16
         one, other, better, settled = _self_crossing(tracer.circle, edge, partner)
         if settled and abs(one - edge) <= SAME_PLACE * edge:
             return one, other, tracer.wall(2.0 * np.arctan(better))[:2]
@@ -305,8 +310,9 @@ def _is_stable_inside(tracer: Tracer, arcs: Arcs) -> bool:
     """Whether walls just inside the middle of each arc are stable, by eigenvalues.
 
     An arc's direction there is that between samples farther apart than DIRECTION_SHARE: where the estimate is all
-    but blind, neighbouring samples can stand in the wrong order. And no wall is taken deeper than a tenth of its
-    arc: beside a bridge in a sharp corner it would be on the other side of the cell.
+    but blind, neighbouring samples can stand in the wrong order. A wall is taken at a depth of a thousandth of its
+    ring's lesser extent, in K T or B, but no deeper than a tenth of its arc: beside a bridge in a sharp corner it
+    would be on the other side of the cell.
     """
     inside = []
     for ring in arcs.rings:
@@ -355,7 +361,8 @@ def bridge_gaps(tracer: Tracer, memory: EdgeMemory) -> float | None:
     ends, along which a root stays on the circle as far as double precision can tell.
     """
     arcs, counts, size = memory.arcs, memory.counts, float(memory.size[EDGE_SIZE])
-    # corner, wall and t of each arc's end, and of each arc's beginning; those that meet are taken out
+    # corner, wall and t of each arc's end, and of each arc's beginning; those that meet are taken out. Arcs no
+    # longer than a corner are none
     alive = np.flatnonzero(arcs.extent[: counts[ARCS]] > SAME_CORNER * size)
     ends = [(int(arcs.node[k, 1]), arcs.last[k].copy(), arcs.end[k]) for k in alive]
     starts = [(int(arcs.node[k, 0]), arcs.first[k].copy(), arcs.start[k]) for k in alive]

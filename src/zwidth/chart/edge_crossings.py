@@ -109,6 +109,7 @@ class EdgeChords:
         at = np.asarray(fixed, dtype=float)[:, None]
         # half open: a vertex belongs to one of its chords, and a chord along the line to none
         crossed = ((x0 <= at) & (at < x1)) | ((x1 <= at) & (at < x0))
+        # left, stable, of a chord towards larger K are the walls above it; towards larger B the softer ones
         if edge is not None:
             crossed &= (x1 > x0) == (edge != "upper")
         line, chord = np.nonzero(crossed)
@@ -143,7 +144,7 @@ class EdgeChords:
         a, b = self.frequency[chord, 0] * turn, self.frequency[chord, 1] * turn
         at_a, at_b = self.first[chord, across] - at, self.last[chord, across] - at
         other = self.first[chord, 1 - across]
-        angle, side = a.copy(), np.zeros(len(at))
+        angle, side = a.copy(), np.zeros(len(at))  # side: which end the last step has replaced, a 1 or b -1
         going = at_a != 0.0
         for _ in range(MOST_STEPS):
             if not going.any():
@@ -170,6 +171,7 @@ class EdgeChords:
         crossed = ((x0 <= at) & (at < x1)) | ((x1 <= at) & (at < x0))
         with np.errstate(divide="ignore", invalid="ignore"):
             y = y0 + (at - x0) * (y1 - y0) / (x1 - x0)
+        # of the chords above a wall those towards smaller K have it on their left, and count 1, the others -1
         return np.asarray(np.sum(np.where(crossed & (y > above), np.sign(x0 - x1), 0.0), axis=1) > 0.0)
 
     def nearest(

@@ -72,7 +72,7 @@ def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float
     """
     circle = memory.circle
     sizes, t = circle.sizes, memory.samples.t
-    # past samples that the loop uses: a delay of n samples turns n times as fast as z
+    # past samples that the loop uses: a delay of n samples turns n times as fast as z, by half a radian a step
     late = sizes[WHOLE_DELAY] + sizes[WINDOW]
     n = fill_samples(memory.features, circle.radius[0], share, min(longest, 0.5 / late), near_end, t)
     # a plain backward difference is nowhere blind
@@ -222,6 +222,7 @@ def edge_flag(memory: EdgeMemory, t: float) -> int:
 def degree_of(loops: LoopTable, i: int) -> int:
     """Degree of a loop's characteristic polynomial."""
     c = loops.computer[i]
+    # an estimate from so many samples has one root less than these
     N = 2 * loops.section_count[i] + loops.whole_delay[c] + loops.split[c] + loops.window_count[c] - 1
     # a factor of the computer whose denominator has d2 = 0 is of first order
     for k in range(loops.force_count[c]):

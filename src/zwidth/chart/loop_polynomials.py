@@ -289,7 +289,7 @@ def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
         # a coefficient of the other sign, certainly: a root outside
         if value < -terms:
             return -1
-        if not value > 1e3 * terms:
+        if not value > 1e3 * terms:  # one relative error for all would grow too large: `hurwitz` has one for each
             return 0
         if error * value < terms:
             error = terms / value
@@ -359,7 +359,7 @@ def edges_stable_set(polynomials: Floats, N: int, t: float, K: float, B: float, 
     1 yes, -1 no, 0 lost in rounding."""
     if not (np.isfinite(K) and np.isfinite(B)):
         return -1
-    if N == 2:
+    if N == 2:  # there are no others
         return 1
     combine(polynomials, N, K, B, room)
     deflate(room, N, t * t)
@@ -392,6 +392,7 @@ def quotient_flag(polynomials: Floats, N: int, first: int, degree: int, K: float
 
 @compiled_lean
 def all_roots_inside(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> int:
-    """Whether the wall K, B has all its roots inside the circle that `polynomials` were built for: 1, -1 or 0."""
+    """Whether the wall K, B has all its roots inside the circle that `polynomials` were built for: 1
+    yes, -1 no, 0 lost in rounding."""
     combine(polynomials, N, K, B, room)
     return hurwitz(room, P, N)

@@ -31,8 +31,8 @@ from zwidth.loop.loop_table import (
     velocity_on_circle,
 )
 
-FAR = 2.0  # a turn of phase beyond which a step is halved
-HALVINGS = 60
+FAR = 2.0  # twice the turn of phase [rad] beyond which a step is halved
+HALVINGS = 60  # a step is cut into 64 times as many pieces at most
 BESIDE = 1e-7  # samples this near to a root on the circle tell nothing of the others
 CLEAR = 0.2  # how far from a whole number of half turns the phase may end
 
@@ -55,6 +55,7 @@ def terms_at(circle: CircleFactors, theta: float) -> tuple[complex, complex, com
         A *= scaled_factors(den, 1.0 / abs(den))
     A = _times_denominators(A, circle.force, circle.sizes[FORCE], cc, ss, sc)
     A = _times_denominators(A, circle.velocity, circle.sizes[VELOCITY], cc, ss, sc)
+    # roots z = 0 turn by theta: by the half that is in `turns`, and as much again
     late = circle.sizes[WHOLE_DELAY] + circle.sizes[SPLIT] + circle.sizes[WINDOW] - 1
     A *= complex(np.cos(0.5 * late * theta), np.sin(0.5 * late * theta))
     scale = 1.0 / max(1.0, abs(P), abs(P * w))

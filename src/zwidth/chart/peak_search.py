@@ -44,11 +44,13 @@ from zwidth.loop.loop_table import DEGREE, wall_on_circle, wall_with_slopes
 WIDE_SHARE, WIDE_STEP, SMALL_DEGREE = 0.4, 0.2, 7
 # How near to its ends the curve is sampled.
 NEAR_END: Final = 0.05
-BESIDE: Final = 1e-6  # how far beside a corner the edge is looked at, in shares of t, or of K
+BESIDE: Final = 1e-6  # how far beside a corner the edge is looked at, in shares of t, or of K: less is not stiffer
 # A stiffness below this share of the plant's own, some m/T^2, may be rounding of 0.
 NOTHING: Final = 1e-10
 PARTS: Final = 4  # chords that a piece of the curve between two samples is taken for, where it may cross another
-BEYOND_CHORD: Final = 0.25  # how far beyond their ends chords are taken to cross, in shares of their lengths
+# How far beyond their ends chords are taken to cross, in shares of their lengths; and how much softer than the
+# stiffest wall, as a share of it, a crossing estimated so is still looked at.
+BEYOND_CHORD: Final = 0.25
 FAR_BELOW: Final = 0.1  # what a coefficient may be below 0, in shares of its terms, near a stable wall
 # A wall that misses the stiffest found by more than this cannot be the stiffest.
 SLACK: Final = 1.01
@@ -172,7 +174,7 @@ def _edge_goes_on(memory: EdgeMemory) -> bool:
     # along the line of the real root, a + s K + v B = 0
     a, s, v = line_of(memory, other)
     K = peak[PEAK_K] * (1.0 + BESIDE)
-    B = -(a + s * K) / v if v != 0.0 else -1.0
+    B = -(a + s * K) / v if v != 0.0 else -1.0  # -1: none, on a line of one stiffness
     low_end = 1 if other == 0.0 else 0
     polynomials, N = memory.polynomials.coefficients, circle.sizes[DEGREE]
     return B >= 0.0 and edges_on_line(polynomials, N, low_end, K, B, memory.room) >= 0
@@ -266,12 +268,14 @@ def _is_edge_inside(memory: EdgeMemory, i: int) -> bool:
     of K, if it is stiffer there than the stiffest wall found."""
     samples, j, stiffer = memory.samples, i + 1, memory.peak[PEAK_K] * (1.0 + BESIDE)
     t, K, B, whole = samples.t, samples.K, samples.B, samples.t[i + 1] - samples.t[i]
+    # the line 0 + 0 K + 1 B = 0
     if B[i] * B[j] < 0.0 and stiffer < _crossing_between(memory, i, (0.0, 0.0, 1.0))[0]:
         share = B[i] / (B[i] - B[j])
         if edge_flag(memory, t[i] + share * whole) >= 0:
             return True
     step = 2.0 * whole / (t[j] + t[i])  # of ln t
     rise, next_rise = step * samples.slope_K[i], step * samples.slope_K[j]
+    # no maximum, or that which is the stiffest wall found
     if not (rise > 0.0 and next_rise < 0.0) or t[i] <= memory.peak[PEAK_T] <= t[j]:
         return False
     k1, k2, k3 = _cubic(K[i], K[j], rise, next_rise)

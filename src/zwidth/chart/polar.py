@@ -120,6 +120,7 @@ def _movable_plane(jacobian: Floats) -> str:
     whole = np.linalg.norm(jacobian, 2)
     for plane, axes in PLANES.items():
         rows = jacobian[list(axes)]
+        # two joints at least, and no direction of the plane out of reach but for rounding
         if min(rows.shape) == 2 and np.linalg.svd(rows, compute_uv=False)[-1] > 1e-9 * whole:
             return plane
     return "xy"

@@ -20,7 +20,7 @@ def spread_roots(roots: Complexes) -> None:
     """Starting values spread over the disk |z| < 1, in the s plane."""
     N = len(roots)
     for k in range(N):
-        angle = 2.0 * np.pi * (k + 0.37) / N
+        angle = 2.0 * np.pi * (k + 0.37) / N  # none real, no two conjugate: the iteration would keep them so
         z = 0.8 * complex(np.cos(angle), np.sin(angle))
         roots[k] = (z - 1.0) / (z + 1.0)
 
@@ -44,7 +44,7 @@ def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
                     slope = slope * s + value
                     value = value * s + p[k]
                 newton = divide(value, slope)
-            else:  # the reversed polynomial in 1/s, so that no power overflows
+            else:  # the reversed polynomial q(1/s) = p(s)/s^N, so that no power overflows: p/p' = s q/(N q - q'/s)
                 t = divide(one, s)
                 for k in range(N + 1):
                     slope = slope * t + value
@@ -85,7 +85,7 @@ def real_root(p: Floats) -> float:
         y = -y if r > 0.0 else y
     s = y - third
     slope = (3.0 * s + 2.0 * a) * s + b
-    nearer = s - (((s + a) * s + b) * s + c) / slope
+    nearer = s - (((s + a) * s + b) * s + c) / slope  # no use where that is long, as at a double root
     return float(nearer if abs(nearer - s) < 0.1 * abs(s) else s)
 
 

@@ -217,7 +217,7 @@ class Tracer:
         """Whether the stable side is on the left for growing theta: Im w > 0.
 
         Moving a root by dz = -(S dK + V dB)/p'(z) along the left normal changes |z| by an amount of the sign of
-        -Im(V conj S) = -|S|^2 Im w (Neimark's rule).
+        -Im(V conj S) = -|S|^2 Im w (Neimark's rule), with p = A + K S + B V of `loop_polynomials`, V = w S.
         """
         return bool(self.loop.velocity_response(self.radius * np.exp(1j * theta)).imag > 0.0)
 
@@ -312,7 +312,8 @@ def _refined_angles(circle: CircleFactors, nodes: Floats, tolerance: float, most
 
 @compiled
 def sign_changes(circle: CircleFactors, t: Floats, ends: Floats, component: int) -> Floats:
-    """The t on an arc at which K (0), B (1) or dK/dtheta (2) changes sign.
+    """The t on an arc at which K (0), B (1) or dK/dtheta (2) changes sign: numbers as OF_K, OF_B, OF_SLOPE of
+    `curve`.
 
     t     (n,)    tan(theta/2) from end to end
     ends  (2, 2)  the walls at both ends

@@ -196,6 +196,7 @@ def rounding_of_roots(L: Floats, radius: float | None = None, rounding: float = 
     error = rounding * float(np.linalg.norm(balanced)) * condition
     apart = np.abs(z[:, None] - z) + np.where(np.eye(len(z)), np.inf, 0.0)
     error = np.where(apart.min(axis=1, initial=np.inf) < COALESCING, np.minimum(error, MOST_ROUNDING), error)
+    # of the roots within 1e-6 of the radius, or of the nearest ones, the largest error
     distance = np.abs(np.abs(z) - (np.max(np.abs(z)) if radius is None else radius))
     return float(np.max(error[distance <= max(1e-6, float(np.min(distance)))]))
 

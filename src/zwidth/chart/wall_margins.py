@@ -233,7 +233,7 @@ def _stiffest_fit(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floa
                     tried[m] = K
                     m += 1
     _sort(tried, m)
-    above = top * (1.0 + 1e-9)
+    above = top * (1.0 + 1e-9)  # beyond rounding, so that `top` itself is tried
     for k in range(m - 1, -1, -1):
         for K in (0.5 * (above + tried[k]), tried[k]):
             if above > K and fits(nodes, delays, K, a, b):
@@ -393,6 +393,7 @@ def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float,
     stiffness = _stiffest_fit(nodes, len(loops), a, b, np.empty(2 * len(nodes.K) + STEPS))
     if not stiffness > 0.0:
         return None
+    # known to COARSE so far: twice that above it no wall fits
     stiffness = float(
         _largest_fit_between(nodes, len(loops), a, b, 0.0, stiffness, stiffness * (1.0 + 2.0 * COARSE), FINEST)
     )

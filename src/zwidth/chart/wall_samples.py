@@ -309,7 +309,7 @@ def _mark_by_routh(degree: int, n: int, w: Floats) -> None:
             outside, unsure, most, share = w[OUTSIDE + k], w[UNSURE + k], w[SHARE + k], terms / value
             w[p + k] = value
             w[OUTSIDE + k] = 1.0 if value < -terms else outside
-            w[UNSURE + k] = unsure if value > 1e3 * terms else 1.0
+            w[UNSURE + k] = unsure if value > 1e3 * terms else 1.0  # one error for all would grow too large
             w[SHARE + k] = share if share > most else most
     for step in range(degree - 1):
         top = COEFFICIENTS + (degree - step) * LANES

@@ -74,6 +74,7 @@ def first_measured_angles(loop: MeasuredLoop) -> Floats:
     angles = np.unique(np.concatenate(parts))
     dense = np.union1d(angles, np.linspace(angles[0], loop.largest_angle, 4097)[:-1])
     for low, high in _brackets_of_real_estimate(loop, dense):
+        # up to a thousandth of the asymptote's angle away from it on both sides
         steps = closing * (high - low + 1e-3 * high)
         angles = np.concatenate([angles, low - steps, high + steps])
     angles = np.unique(angles)
@@ -154,6 +155,8 @@ def _bisect_chords(
         off = np.abs(along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]) / length
         reach = np.einsum("ij,ij->i", to, along) / length**2
         allowed = tolerances(a, b, m)
+        # too far from the chord; or beside its line, but more than a tenth of its length beyond its ends, if the
+        # chord is not so short that this does not matter
         bent = (off > allowed) | ((np.abs(reach - 0.5) > 0.6) & np.isfinite(allowed) & (length > 1e-3 * allowed))
         if not np.any(bent) or len(angles) > MOST:
             break
@@ -213,6 +216,7 @@ def measured_real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
     if kind == -1:
         near = np.array([NEAREST * loop.angles[0]])
         h = 0.0 if loop.integrators else float(loop.h(near)[0].real)
+        # w of an estimate that is 0 at z = 1 is about i theta / T beside it
         return h, 0.0 if abs(loop.w(near)[0]) * loop.period < 2.0 * near[0] else float(loop.w(near)[0].real)
     end = np.array([np.pi])
     at_end = complex(loop.h(end)[0])
@@ -262,7 +266,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[In
     Returns  (n,) counts, and the least |1 + L| / (1 + |L|) along the way (n,): near 0 the count is not sure
     """
     h, w = measured_real_root(loop, -1)
-    # sign of 1 + L at z = 1, but for the integrators
+    # sign of 1 + L at z = 1, but for the integrators, and `start`, its phase
     static = np.sign(walls[:, 0]) if loop.integrators else np.sign(1.0 - (walls[:, 0] + walls[:, 1] * w) / h)
     start = np.where(static > 0.0, 0.0, np.pi)
     turn, clear, last = np.empty(len(walls)), np.empty(len(walls)), np.empty(len(walls), dtype=np.complex128)

@@ -217,7 +217,8 @@ def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[f
     radius, sweeps = joint_radius(response), response.sweeps
     assert sweeps is not None
     assert radius is not None
-    # of one sweep, relative; a coherence of one average that leaves the same error stands for it
+    # of one sweep, relative, by `joint_radius` of a known one; a coherence g^2 = 1 / (1 + v) of one average stands
+    # for this variance v
     variance = radius**2 * len(sweeps) / np.log(len(radius) / (1.0 - CONFIDENCE))
     for sweep in sweeps:
         alone = replace(
@@ -263,7 +264,11 @@ def _edge_distances(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) ->
 
 
 def _stable_regions(loop: MeasuredLoop) -> tuple[StableRegions | None, bool]:
-    """The stable cells, and whether the boundary closes them: if not, they reach the window's edge."""
+    """The stable cells, and whether the boundary closes them: if not, they reach the window's edge.
+
+    Open ones are looked at in larger windows first. Where some are noise, the others are drawn again in a window
+    of their own, with finer chords.
+    """
     known = sample_boundary(loop, coarse_angles(loop))
     box = window_of_regions(loop, known)
     if box is None:
@@ -328,6 +333,7 @@ def _chart_of_cells(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> M
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
     angles = angles_at_wall(zoomed, peak)
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
+    # as K = Re h - Im h Re w / Im w, an error of h moves K by up to |w / Im w| times its size
     h, w = loop.h(at_peak), loop.w(at_peak)
     errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
     certain, band = _within_error(loop, cells, zoomed, CertainWall(*peak, tuple(angles)), opened)
@@ -447,6 +453,7 @@ def _line_intervals(ring: Floats, h: float, w: float, scale: Floats) -> Iterator
 
     scale  (2,) size of the window in K and in B
     """
+    # corners of cells are known to rounding of the window, 1e-8 of it; pieces below 1e-6 of it are corners
     on = np.abs(ring[:, 0] + ring[:, 1] * w - h) < 1e-8 * (scale[0] + scale[1] * abs(w))
     pieces = np.flatnonzero(on[:-1] & on[1:])
     for run in np.split(pieces, np.flatnonzero(np.diff(pieces) > 1) + 1) if len(pieces) else []:

@@ -101,6 +101,8 @@ class Doubt:
         flags[:, 1::2] = np.abs(F) <= reach
         flags[:, 2:-1:2] = self.joined & (away <= np.maximum(reach[:, :-1], reach[:, 1:]))
         edges = np.diff(flags.astype(np.int8), axis=1)
+        # column 2 k + 1 is angle k: a stretch has the first and last angle in it, or just before where it begins
+        # or ends between two
         wall, first = np.nonzero(edges == 1)
         _, last = np.nonzero(edges == -1)
         hides = self._may_hide(F, wall, first // 2, (last - 1) // 2)
@@ -108,18 +110,19 @@ class Doubt:
         return numbers[0].astype(np.int64), numbers[1].astype(np.int64)
 
     def _may_hide(self, F: Complexes, wall: Ints, first: Ints, last: Ints) -> Flags:
-        """Which stretches (s,), from angle `first` to `last` of a wall, can hide that it is stable.
+        """Which stretches (s,), from angle `first` to `last` of wall number `wall`, can hide that it is stable.
 
         All of F turns by -pi for each root outside. Where F passes 0 clockwise, it may in truth pass on the other
-        side, and there are two roots less; where it passes counter-clockwise, two more. Frequencies whose response
-        is hardly known do not count: what was not measured is not taken to steady a device.
+        side, and there are two roots less; where it passes counter-clockwise, two more. A stretch that
+        reaches the first or last angle has none beyond it that would tell, and can hide it, too. Frequencies whose
+        response is hardly known do not count: what was not measured is not taken to steady a device.
         """
         turned = np.cumsum(np.angle(F[:, 1:] * np.conj(F[:, :-1])), axis=1)
         turned = np.concatenate([np.zeros((len(F), 1)), turned], axis=1)
         before, after = np.maximum(first - 1, 0), np.minimum(last + 1, len(self.angles) - 1)
         clockwise = turned[wall, after] < turned[wall, before]
         at_end = (first == 0) | (last == len(self.angles) - 1)
-        known = np.concatenate([[0], np.cumsum(~self.unknown)])
+        known = np.concatenate([[0], np.cumsum(~self.unknown)])  # how many are before each angle
         return np.asarray((clockwise | at_end) & (known[last + 1] > known[first]))
 
 
@@ -155,12 +158,13 @@ def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
 def _doubt_at_real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float, complex, complex, float, float]:
     """The doubt about a root at z = 1 (kind -1) or z = -1 (kind -2): angle, scale, response, w, radius, rest."""
     h, w = measured_real_root(loop, kind)
+    # P times the scale is -sign h; of an integrator, h = 0, either sign will do, as the scale is 0
     if kind == -1:
         rest = float(loop.error_below(np.zeros(1))[0])
         return 0.0, abs(h), complex(-np.sign(h) or -1.0), complex(w), 0.0, rest
     radius = float(loop.relative_error(np.array([np.pi]))[0])
     if not np.isfinite(h):
-        last = loop.angles_below_pi[-1:]
+        last = loop.angles_below_pi[-1:]  # P is 0, and its error that share of the last P measured, 1 / |h|
         return np.pi, 1.0, 0j, complex(w), radius / float(np.abs(loop.h(last))[0]), 0.0
     return np.pi, abs(h), complex(-np.sign(h) or -1.0), complex(w), radius, 0.0
 
@@ -232,7 +236,8 @@ def judge_measured(
 
 
 def _nearest_frequency(loop: MeasuredLoop, walls: Floats) -> Floats:
-    """Measured frequency (n,) [Hz] at which |1 + L| is least for each wall (n, 2), L = P (K + B w)."""
+    """Measured frequency (n,) [Hz] at which |1 + L| is least for each wall (n, 2), L = P (K + B w) =
+    -(K + B w) / h."""
     theta = loop.angles_below_pi
     h, w = loop.h(theta), loop.w(theta)
     parts = [walls[i : i + 500] for i in range(0, len(walls), 500)]

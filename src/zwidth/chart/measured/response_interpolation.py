@@ -26,7 +26,7 @@ class ResponseInterpolation:
 
     values, slopes  (3, n) of G, 1/G and log G at the nodes, and by theta
     kind            (n - 1,) which of the three is interpolated there: 0, 1 or 2
-    straight        (n - 1,) where G is taken straight from node to node instead
+    straight        (n - 1,) where G is taken straight from node to node instead; `error` is 0 there
     error           (n - 1,) relative error of P to be expected there: a 64th of what the cubic through four
                     neighbours misses a node by, which is the fourth derivative's part in both on even spacing
     closed          whether the response reaches half the sampling rate
@@ -94,7 +94,8 @@ def interpolate_response(
     closed                 whether the last angle is near enough to pi for its mirror image to be the next point
     measured_to_half_rate  False: nothing was measured in the last stretch up to pi, so that no pole is read into
                            it: noise of the last points alone would say that there is one
-    straight               (n - 1,) between which angles G is taken straight: curves through noise run away
+    straight               (n - 1,) between which angles G is taken straight, its `error` then 0: curves through
+                           noise run away
     """
     if len(theta) < FEWEST:
         raise ResponseError(
@@ -107,13 +108,15 @@ def interpolate_response(
         log = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y))
     kinds = np.where(np.isfinite(y) & (y != 0.0), np.array([y, 1.0 / np.where(y == 0.0, 1.0, y), log]), 0.0)
     missed = _missed_between(x, y, kinds)
-    if closed and not measured_to_half_rate:
+    if closed and not measured_to_half_rate:  # from the last angle to its image: not 1/G, which could have a pole
         missed[1, MIRRORED + len(theta) - 1] = np.inf
     kind = np.argmin(missed, axis=0)
     slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
     lines = np.zeros(len(x) - 1, dtype=bool)
     if straight is not None:
         lines[MIRRORED : MIRRORED + len(straight)] = straight
+    # what a straight piece of G misses is not told by a cubic: `MeasuredLoop.relative_error` has it from what was
+    # measured between its ends, or beyond the data from how much the response changed before
     kind, error = np.where(lines, 0, kind), np.where(lines, 0.0, error)
     return ResponseInterpolation(x, kinds, slopes, kind, lines, error, integrators, delay, closed)
 
@@ -124,7 +127,7 @@ def _with_mirror_images(theta: Floats, G: Complexes, closed: bool) -> tuple[Floa
     nodes, values = [-theta[MIRRORED - 1 :: -1], theta], [np.conj(G[MIRRORED - 1 :: -1]), G]
     if closed:
         at_end = np.pi - theta[-1] < 1e-9
-        if at_end:  # G is real at pi
+        if at_end:  # G is real at pi, and not 0, which has no logarithm
             values[1] = np.append(G[:-1], G[-1].real or 1e-15 * abs(G[-2]))
         near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
         nodes.append(2.0 * np.pi - theta[near])
@@ -138,7 +141,8 @@ def _missed_between(x: Floats, y: Complexes, kinds: Complexes) -> Floats:
 
     x, y  (k,) angles [rad] and values of G
     """
-    # what is next to nothing at half the sampling rate (a free mass) is measured by its neighbours
+    # what is next to nothing at half the sampling rate (a free mass) is measured by a fifth of its neighbours'
+    # mean; what log G misses is relative already
     size = np.maximum(np.abs(y), 0.2 * np.mean(np.abs(y[_windows(len(y))[0]]), axis=1))
     missed = np.array(
         [
@@ -160,6 +164,7 @@ def _slopes(x: Floats, y: Complexes) -> Complexes:
     """Derivative (n,) at each node x, y (n,) of the polynomial through it and four neighbours; any spacing."""
     window, here = _windows(len(x))
     scale, gaps = _products(x, window, here)
+    # slopes of Lagrange's basis at the node; its own is the sum of 1 / gaps
     weights = scale[here][:, None] / (scale * gaps)
     weights[here] = np.sum(np.where(here, 0.0, 1.0 / gaps), axis=1)
     return np.asarray(np.sum(weights * y[window], axis=1))

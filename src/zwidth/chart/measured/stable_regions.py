@@ -119,6 +119,7 @@ def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry
             along = (a - b if kind == -1 else b - a) / max(float(np.hypot(*(b - a))), 1e-300)
             ends[first, 0 if kind == -1 else 1] += TICK * along
     meets = np.all((ends.max(axis=1) >= 0.0) & (ends.min(axis=1) <= 1.0), axis=1)
+    # clipped beyond the window, so that lines cross its frame
     clipped = shapely.clip_by_rect(shapely.linestrings(ends[meets]), -1e-6, -1e-6, 1.0 + 1e-6, 1.0 + 1e-6)
     return [line for line in clipped if not line.is_empty]
 
@@ -132,6 +133,7 @@ def has_stable_inner_side(edge: Boundary, which: Ints, scale: Floats) -> Flags:
     along = segments[:, 2:] - segments[:, :2]
     length = np.maximum(np.hypot(*along.T), 1e-300)
     left = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+    # inner: the side with fewer roots outside, left where the jump is negative
     aside = BESIDE * np.minimum(length, 1.0) * np.where(edge.jumps[which] < 0, 1.0, -1.0)
     middle = 0.5 * (segments[:, :2] + segments[:, 2:])
     return np.asarray(edge.outside((middle + aside[:, None] * left) * scale) == 0)
@@ -177,7 +179,11 @@ def _walls_in_sectors(loop: MeasuredLoop, beside: float) -> Floats:
 
 
 def refine_peak(loop: MeasuredLoop, cells: StableRegions) -> tuple[tuple[float, float], StableRegions]:
-    """The wall of the largest stiffness with K > 0, B >= 0, nan if there is none, and the cells round it."""
+    """The wall of the largest stiffness with K > 0, B >= 0, nan if there is none, and the cells round it.
+
+    Looked for again in a small window round it; what is found at the window's stiff side is cut off by it, and not
+    kept, and for what is found at its sides in damping there is a second one.
+    """
     peak, nearby = _stiffest(cells), cells
     for _ in range(2):
         if isnan(peak[0]):
@@ -322,6 +328,7 @@ def _ellipse_outlines(loop: MeasuredLoop, theta: Floats, walls: Floats) -> Float
     w, h = loop.w(theta), loop.h(theta)
     r = np.minimum(loop.relative_error(theta), LARGEST_DRAWN)
     size = (r * np.abs(h) + loop.error_below(theta) * (theta < loop.angles[0])) / (1.0 - r * r)
+    # a polygon round the unit circle; offset: from h, which the wall itself has, to points round the disk
     circle = np.exp(2j * np.pi * np.arange(CORNERS) / CORNERS) / np.cos(np.pi / CORNERS)
     offset = (r * r / (1.0 - r * r) * h)[:, None] + size[:, None] * circle
     dB = offset.imag / w.imag[:, None]
@@ -417,7 +424,7 @@ def _certain_stiffnesses(edge: Boundary, doubt: Doubt, dampings: Floats) -> Floa
     number = np.repeat(np.arange(len(gaps)), [len(gap) for gap in gaps])
     every = np.vstack(gaps)
     stable = edge.outside(np.column_stack([_middles(every), dampings[number]])) == 0
-    stable &= np.isfinite(every[:, 1])
+    stable &= np.isfinite(every[:, 1])  # no wall without an upper limit is taken for stable
     result = np.full(len(dampings), -inf)
     np.maximum.at(result, number[stable], every[stable, 1])
     return np.where(np.isfinite(result), result, nan)
@@ -426,12 +433,13 @@ def _certain_stiffnesses(edge: Boundary, doubt: Doubt, dampings: Floats) -> Floa
 def _doubtful_intervals(edge: Boundary, doubt: Doubt, B: float) -> Floats:
     """Intervals of K (n, 2) [N/m] that are in doubt on the line of damping B [N s/m]; ends may be infinite.
 
-    Symbols are those of the file's head.
+    a, b and c are those of the file's head; p, s, w, R and rho there are `response`, `scale`, `velocity`, `radius`
+    and `rest` of `Doubt`. Where a < 0 and there are no roots, all K are in doubt.
     """
     p, s, w, R2 = doubt.response, doubt.scale, doubt.velocity, doubt.radius**2
     base = s + p * (B * w)
     a = np.abs(p) ** 2 - R2
-    a = np.where(np.abs(a) < 1e-12, -1e-12, a)
+    a = np.where(np.abs(a) < 1e-12, -1e-12, a)  # an error as large as the response, but for rounding
     b = (np.conj(p) * base).real - R2 * B * w.real
     c = np.abs(base) ** 2 - R2 * B**2 * np.abs(w) ** 2 - doubt.rest**2
     met = b * b >= a * c
@@ -480,7 +488,8 @@ def _middles(gaps: Floats) -> Floats:
 
 
 def _binding_angles(doubt: Doubt, K: float, B: float) -> tuple[float, ...]:
-    """The angles at which a wall is at the edge of doubt: one, or two at a corner."""
+    """The angles at which a wall is at the edge of doubt: one, or two at a corner. Clearances up to BINDING, or up
+    to twice the least, are taken for none."""
     near, theta = doubt.clearance(K, B)
     at = np.flatnonzero(near < max(BINDING, 2.0 * float(np.min(near))))
     runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)

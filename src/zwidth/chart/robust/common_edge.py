@@ -340,7 +340,8 @@ def _solve_crossing(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corne
 
 
 def _within(run: ArcRun, u: float) -> bool:
-    """Whether a parameter u lies on the run's arc, or next to it."""
+    """Whether a parameter u lies on the run's arc, or next to it: within a length of a straight one, which a
+    step of Newton's method may leave, or a thousandth of a curved one."""
     if not run.arc.curved:
         return -1.0 <= u <= 2.0
     low, high = sorted((run.arc.start, run.arc.end))

@@ -192,7 +192,8 @@ def _stiffest_common(
     common_quadrant  the walls with K >= 0, B >= 0 that all have in common, in [K unit, B]
 
     The member of least stiffness has its stiffest wall from its own chart, which is sharper than polygons: if all
-    others find that wall stable it is the answer. Otherwise it is the stiffest corner of what is in common.
+    others find that wall stable, and the stiffest common corner is as stiff to 10 CHORD, it is the answer.
+    Otherwise it is that corner, softened by the least of SOFTER at which all find it stable.
     """
     K, B = _stiffest(common_quadrant, unit)
     if not K > 0.0:
@@ -238,7 +239,8 @@ def _size(common: shapely.MultiPolygon) -> Floats:
 def _members_at(
     shapes: Mapping[int, shapely.MultiPolygon], common: shapely.MultiPolygon, K: float, B: float
 ) -> tuple[int, ...]:
-    """Indices of the members on whose edge a wall [K unit, B] lies, two at most; the nearest one in any case."""
+    """Indices of the members on whose edge a wall [K unit, B] lies, to some chords' distance, 10 CHORD of the
+    set's size: two at most, and the nearest one in any case."""
     away = _distances(shapes, np.array([[K, B]]), _size(common))[:, 0]
     order = [k for k in np.argsort(away, kind="stable")[:2] if away[k] <= max(away.min(), 10.0 * CHORD)]
     return tuple(sorted(list(shapes)[k] for k in order))

@@ -18,7 +18,7 @@ from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquati
 from zwidth.chart.several_directions.wall_curves import WallBox
 
 # A wall continues in another one if it misses it by less than these shares of their distance, and of what it
-# misses the next best by.
+# misses the next best by; and if both slopes run along their chord, with at least the first as cosine.
 CLEAR, UNRIVALLED = 0.3, 0.25
 # Walls closer than this share of the box are joined whatever their slopes, which rounding turns beside z = 1 and
 # -1.
@@ -26,7 +26,7 @@ SAME: Final = 1e-6
 # A point between two walls that meet is no further from their chord's middle than this share of it, and the curve
 # runs along the chord at all three: the least cosine.
 NEAR_CHORD, ALONG = 0.25, 0.8
-# Steps are halved down to this share of the parameter.
+# Steps are halved down to this share of the parameter, or of 1e-3 where it is smaller.
 NARROWEST: Final = 1e-14
 ROUNDS: Final = 50
 # Walls this far around the box, in shares of it, are followed, too.
@@ -112,6 +112,7 @@ def _link(equation: RootEquation, samples: BranchSamples, box: WallBox) -> tuple
     """Number (N - 1, q) of the wall at the next parameter in which each continues, -1 for none; folds; and
     which intervals (N - 1,) miss links."""
     forward = _continuations(samples, box)
+    # ahead, behind: walls near the box that lack a continuation there
     near = box.with_margin(AROUND).holds(samples.walls)
     ahead, behind = near.copy(), near.copy()
     ahead[-1], behind[0] = False, False

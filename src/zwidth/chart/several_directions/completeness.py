@@ -90,7 +90,7 @@ def _moves_both(equation: WallEquation) -> bool:
 @np.errstate(all="ignore")  # walls at infinity are data
 def _walls_with_pairs(equation: WallEquation, thetas: Floats) -> Floats:
     """All walls with a pair of roots at these angles (n,), as rows (k, 3) of [theta, K T, B]."""
-    # k s + b v w = h, as at the file's head
+    # k s + b v w = h, as at the file's head; under one law B of `terms` is s Y
     s, v = equation.stiffness[0], equation.damping[0]
     forces, stiffened, _ = equation.terms(thetas)
     known = np.isfinite(forces).all(axis=(1, 2)) & np.isfinite(stiffened).all(axis=(1, 2))
@@ -161,7 +161,7 @@ def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]
     far = ROOM * edges.max(axis=0, initial=0.0)
     if not far.any():  # none, or the origin alone
         return None
-    far = np.where(far > 0.0, far, max(far))
+    far = np.where(far > 0.0, far, max(far))  # K T or B of all edges may be 0: as large as the other then
     return WallBox(-far, far)
 
 

@@ -59,7 +59,8 @@ from zwidth.chart.several_directions.wall_equation import (
 )
 from zwidth.loop.multi_loop import MultiLoop
 
-# A velocity estimate below this share of 1/T, or an imaginary part below this share of its number, is rounding.
+# A velocity estimate below this share of 1/T, an imaginary part below this share of its number, and an asymmetry
+# below this share of a matrix's largest entry are rounding.
 ROUNDING: Final = 1e-9
 # A motion at rest is held by no spring where its stiffness is below this share of the largest.
 UNSPRUNG: Final = 1e-10
@@ -71,10 +72,10 @@ POLISH: Final = 3
 
 @dataclass(frozen=True)
 class RealRootEquation:
-    """Walls [k T, b] with a real root, by s = (k - b w)/2 [N/m].
+    """Walls [k T, b] with a real root, by s = (k - b w)/2 [N/m]: det W = 0 with W = F + k D Y + b w E Y.
 
     forces, readings   F, Y (r, r)
-    stiffness, damping s, v (r,) of the law, no two of them 0 in one direction
+    stiffness, damping diagonals of D and E (r,): the law's along each direction, not both 0 along one
     estimate           w [1/s], not 0
     real_angle         0 or pi
     period             T [s]
@@ -96,11 +97,13 @@ class RealRootEquation:
             k, b = t + s, (t - s) / w
             points = np.stack([np.broadcast_to(s, t.shape), k * T, b], axis=-1).reshape(-1, 3)
             value, slopes = (x.reshape(*t.shape, -1) for x in self._determinant(points))
+            # by t at this s, k T grows by T and b by 1 / w
             t = t - value[..., 0] / (slopes[..., 0] * T + slopes[..., 1] / w)
         return np.stack([(t + s) * T, (t - s) / w], axis=-1)
 
     def linear(self, points: Floats) -> tuple[Floats, Floats]:
-        """det W and (k - b w)/2 - s, (n, 2), and their slopes (n, 2, 3) at points (n, 3) of [s, k T, b]."""
+        """det W (as of `_determinant`) and (k - b w)/2 - s, (n, 2), and their slopes (n, 2, 3) at points (n, 3) of
+        [s, k T, b]."""
         s, x, b = points.T
         value, slopes = self._determinant(points)
         off = 0.5 * (x / self.period - b * self.estimate) - s
@@ -113,19 +116,21 @@ class RealRootEquation:
         return np.full(len(parameters), self.real_angle)
 
     def _determinant(self, points: Floats) -> tuple[Floats, Floats]:
-        """det W (n, 1) and its slopes (n, 2) by k T and b, in one unit."""
+        """det W (n, 1) and its slopes (n, 2) by k T and b at points (n, 3) of [s, k T, b], all divided by the
+        largest cofactor of W there, so that they neither overflow nor vanish; its zeros stay."""
         _, x, b = points.T
-        D = self.stiffness[:, None] * self.readings / self.period
-        E = self.estimate * self.damping[:, None] * self.readings
-        W = self.forces + x[:, None, None] * D + b[:, None, None] * E
+        by_x = self.stiffness[:, None] * self.readings / self.period  # slopes of W by x = k T, D Y / T, and by b
+        by_b = self.estimate * self.damping[:, None] * self.readings
+        W = self.forces + x[:, None, None] * by_x + b[:, None, None] * by_b
         cofactors = adjugate(W)
         size = np.abs(cofactors).max(axis=(1, 2))[:, None]
-        slopes = np.stack([np.einsum("nij,ji->n", cofactors, X) for X in (D, E)], axis=-1)
+        slopes = np.stack([np.einsum("nij,ji->n", cofactors, X) for X in (by_x, by_b)], axis=-1)
         return determinant(W)[:, None] / size, slopes / size
 
     def _eigenvalues(self, parameters: Floats) -> Floats:
         """t = (k + b w)/2 (N, r) for s (N,), to the digits of an eigenvalue solver; nan for those that are not
         real."""
+        # W Y^-1 = F Y^-1 + s (D - E) + t (D + E), divided by the root of D + E on both sides: -t are eigenvalues
         root = np.sqrt(self.stiffness + self.damping)
         H = self.forces @ np.linalg.inv(self.readings) / np.outer(root, root)
         whole = H + parameters[:, None, None] * np.diag((self.stiffness - self.damping) / root**2)
@@ -169,7 +174,8 @@ def _lines_of_stiffness(
     scale  of the plant's stiffness at other frequencies, which tells rounding from 0
 
     Free motions that the law only damps have a root at z = 1 for every wall (`MultiLoop.affine`): it is left out,
-    and there are lines of those b that bring another one there.
+    and there are lines of those b that bring another one there. Along these motions P^-1 + b w E is (z - 1) times
+    dH + b dw E, with slopes by z, to first order: that is what must be singular.
     """
     s, v, T = equation.stiffness, equation.damping, equation.loop.period
     angle = 0.0 if z > 0.0 else np.pi
@@ -208,7 +214,7 @@ def _singular_numbers(A: Floats, B: Floats, scale: float) -> list[float]:
     x = x[np.isfinite(x)]
     for _ in range(POLISH):
         W = A + x[:, None, None] * B
-        step = determinant(W) / np.einsum("nij,ji->n", adjugate(W), B)
+        step = determinant(W) / np.einsum("nij,ji->n", adjugate(W), B)  # a long one leads away
         x = np.where(np.abs(step) < 0.1 * np.abs(x), x - step, x)
     return [float(value) if abs(value) > ZERO * scale else 0.0 for value in x]
 
@@ -513,7 +519,8 @@ def _real_number(equation: WallEquation, thetas: Floats, ends: tuple[complex, co
     return theta, number(theta)
 
 
-# Directions whose coupling is a smaller share of their own responses are not coupled.
+# Directions whose coupling is a smaller share of their own responses are not coupled, and sets of directions whose
+# responses differ by a smaller share of the largest have the same.
 UNCOUPLED: Final = 1e-11
 # Angles at which responses are compared.
 PROBES: Final = (0.03, 0.4, 1.1, 1.9, 2.7)

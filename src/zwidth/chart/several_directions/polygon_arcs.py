@@ -66,7 +66,7 @@ def ring_arcs(curves: Sequence[WallCurve], ring: Floats, period: float) -> list[
         one, other = ((float(x / period), float(y)) for x, y in (first, last))
         inner = curve.parameters[(curve.parameters > min(start, end)) & (curve.parameters < max(start, end))]
         kind = curve.kind
-        if kind not in CURVED or start == end:
+        if kind not in CURVED or start == end:  # a line; or one place of a curve, a chord between two corners
             angle = float(curve.at(np.array([start]))[4][0])
             kind, inner, start, end = CHORD if kind in CURVED else kind, inner[:0], angle, angle
         arcs.append(Arc(kind, one, other, start, end, inner if start < end else inner[::-1], run.curve))
@@ -205,7 +205,8 @@ def _common_wall(
     start_a, start_b  parameters near it;   size  of the ring
 
     With walls p(s) of a and q(t) of b, p - q must vanish. On one curve p(s) = p(t) holds wherever s = t, too: what
-    must vanish there is (p(s) - p(t)) / (s - t).
+    must vanish there is g = (p(s) - p(t)) / (s - t), with the slopes (p'(s) - g) / (s - t) by s and
+    (g - p'(t)) / (s - t) by t.
     """
     s, t, last = start_a, start_b, np.inf
     meant, apart = np.zeros(2), np.inf

@@ -79,18 +79,21 @@ class WallEquation:
         first = k, b = _common_eigenvalues(*terms)
         for _ in range(POLISH):
             k, b = _newton_step(terms, k, b)
+        # b in units of k: as much of C weighs as one of B
         unit = (np.linalg.norm(terms[2], axis=(1, 2)) / np.linalg.norm(terms[1], axis=(1, 2)))[:, None]
         size = np.abs(k) + unit * np.abs(b)
         # what was at infinity but for rounding does not stay near where it was
         found = np.abs(k - first[0]) + unit * np.abs(b - first[1]) <= STAYS * size
         found &= np.abs(k.imag) + unit * np.abs(b.imag) <= REAL * size
+        # of solutions that are one, which Newton's method has led together, the first stays
         apart = np.abs(k[:, :, None] - k[:, None]) + unit[..., None] * np.abs(b[:, :, None] - b[:, None])
         found &= ~(np.tril(apart <= TWICE * size[..., None], -1) & found[:, None]).any(axis=2)
         walls = np.stack([k.real * self.loop.period, b.real], axis=-1)
         return np.where((found & np.isfinite(walls).all(axis=-1))[..., None], walls, np.nan)
 
     def linear(self, points: Floats) -> tuple[Floats, Floats]:
-        """det W (n, 2), real and imaginary part, and its slopes (n, 2, 3) at points (n, 3) of [theta, k T, b]."""
+        """det W (n, 2), real and imaginary part, and its slopes (n, 2, 3) at points (n, 3) of [theta, k T, b],
+        divided by the largest cofactor of W: its zeros stay."""
         theta, x, b = points.T
         f = self._frame(theta)
         A, B, C = self._terms(f)
@@ -146,6 +149,7 @@ class WallEquation:
             except np.linalg.LinAlgError:  # readings that depend on each other
                 H = dH = None
         F, Y, small = _forces_and_readings(P, H)
+        # columns with Y = P F keep F along the angle, those with F = H Y keep Y
         dF, dY = np.zeros_like(F), turn * dP @ F
         if dH is not None:
             dF, dY = np.where(small, turn * dH @ Y, 0.0), np.where(small, 0.0, dY)
@@ -290,7 +294,7 @@ def features(loop: MultiLoop) -> Complexes:
     held, estimator, force = loop.sampled_plant, loop.estimator, loop.force_filter
     m = loop.count
     split = loop.fractional_delay > 0.0
-    A = held.step
+    A = held.step  # the transition matrix less 1, whose eigenvalues are z - 1
     B, C = held.new, held.reading
     if split:  # the older force as states
         A = np.block([[held.step, held.old], [np.zeros((m, len(held.step))), -np.eye(m)]])
