@@ -49,7 +49,7 @@ class Equilibrium:
     motions, drives  of the links, in the posture that they have
     counted        the device as the computer sees it
     springs        of the drives
-    wall_force     f, that the wall pushes with along the direction [N]
+    wall_force     f, that the wall pushes with along the direction [N], or turns with about an axis [N m]
     hand_force, hand_moment  (3,)  of the hand on the handle [N], [N m]
     bending        (x,)  elastic coordinates of the flexible links
     deflections    (d,)  by which the motors are ahead of their joints, at the joint [rad], of a prismatic one [m]

@@ -37,7 +37,7 @@ def balance_text(found: Equilibrium) -> str:
     """The forces in balance in words: of the wall, and of the hand, with what of it acts across the direction."""
     turns = not np.any(found.screw[:3])  # a moment about an axis is rendered, no force
     force, unit = (found.hand_moment, "N m") if turns else (found.hand_force, "N")
-    text = f"wall {amount(found.wall_force, 'N')}, hand {vector(force, unit)}"
+    text = f"wall {amount(found.wall_force, unit)}, hand {vector(force, unit)}"
     if has_sideways_force(found):
         across = vector(found.sideways_force, unit)
         text += f", of which {across} across the direction, which this posture needs"
