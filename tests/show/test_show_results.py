@@ -223,6 +223,9 @@ def test_columns_are_the_lists_of_the_document(all_results, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_result_draws_itself_and_stands_in_a_notebook(all_results, name):
     result = all_results[name]
+    if not DRAWINGS.keys() & {kind.__name__ for kind in type(result).__mro__}:
+        assert "<svg" not in result._repr_html_()
+        return
     figure, ax = pyplot.subplots()
     assert result.plot(ax) is ax
     assert ax.lines or ax.collections or ax.patches or ax.images or ax.texts
@@ -318,10 +321,14 @@ def test_an_empty_guarantee_is_drawn_with_its_reason():
     pyplot.close("all")
 
 
-def test_what_has_no_drawing_says_so():
+def test_what_has_no_drawing_says_so_and_stands_in_a_notebook_with_its_lines():
     class Bare(Result):
         """Nothing."""
 
+        def __repr__(self):
+            return "2 kg & no figure"
+
+    assert Bare()._repr_html_() == "<pre>2 kg &amp; no figure</pre>"
     with pytest.raises(TypeError, match="a Bare"):
         Bare().plot()
 

@@ -52,13 +52,16 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
 
 
 def notebook(result: Any) -> str:
-    """A result as HTML: its few lines, and its figure beneath."""
+    """A result as HTML: its few lines, and beneath its figure, if results of its kind have one."""
+    lines = f"<pre>{escape(repr(result))}</pre>"
+    if not any(kind.__name__ in DRAWINGS for kind in type(result).__mro__):
+        return lines
     drawing, ax = figure(*size_of(result))
     with context(), speaking_of_moments(_is_about_moments(result)):
         drawing_of(result)(ax, result)
         write_caption(drawing, caption_of_result(result))
     picture = inline_svg(drawing, f"zwidth-{next(FIGURE_NUMBERS)}", repr(result).splitlines()[0])
-    return f"<pre>{escape(repr(result))}</pre>\n<div style='max-width: 40em'>{picture}</div>"
+    return f"{lines}\n<div style='max-width: 40em'>{picture}</div>"
 
 
 def _is_about_moments(result: Any) -> bool:
