@@ -288,7 +288,8 @@ def simple_rings(outlines: Sequence[Floats], simple: Sequence[bool] | None = Non
 
 
 def cut_at_holes(cell: shapely.Polygon) -> list[shapely.Polygon]:
-    """A polygon with holes as polygons without, cut upright through each hole's middle."""
+    """A polygon with holes as polygons without, cut upright through each hole's middle; holes of rounding size are
+    filled."""
     holes = [hole for hole in map(shapely.Polygon, cell.interiors) if hole.area > ROUNDING_AREA * cell.area]
     if not holes:
         return [shapely.Polygon(cell.exterior)]

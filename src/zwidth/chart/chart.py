@@ -92,7 +92,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     loop    plant, sampling, delay and filter
     radius  1 for stability; less for the walls whose slowest motion shrinks at least by that factor per sample
     decay   False skips the search for the fastest-decaying walls, which takes most of the time
-    Raises  ChartError if the edge cannot be closed (a sliver finer than double precision resolves)
+    Raises  ChartError if the edge cannot be closed (a sliver finer than double precision resolves);
+            ValueError for another radius
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant

@@ -44,7 +44,7 @@ SHARED: Final = ("memory.area.rule", "memory.search.least", "memory.search.sizes
 
 
 def numbers_on_gpu(loops: LoopTable, what: int) -> ChartNumbers:
-    """`chart_batch.chart_numbers` on a GPU, which `resources.check_processor` has found."""
+    """`chart_batch.chart_numbers` on |z| = 1, on a GPU, which `resources.check_processor` has found."""
     N = len(loops.rows)
     out = empty_numbers(N)
     if N == 0:
@@ -152,6 +152,7 @@ def function_of_gpu(kernel: Any) -> Any:
     kernel  as the decorators of `compiled` return it; it must not call itself
     """
     function = kernel.py_func
+    # its global names, each with the value that the GPU has for it
     known = {"__name__": function.__module__, "__builtins__": __builtins__}
     for name in {name for code in _codes(function.__code__) for name in code.co_names}:
         if name in function.__globals__:

@@ -83,7 +83,7 @@ def read_numbers(memory: EdgeMemory) -> bool:
     numbers[LARGEST_DAMPING], numbers[AREA] = 0.0, 0.0
     memory.stops[0], memory.counts[STOPS] = 0.0, 1  # dampings from B = 0 on
     scale = _largest_stiffness_of_edge(memory)
-    if scale == 0.0:
+    if scale == 0.0:  # no ring
         return True
     for k in range(memory.counts[ARCS]):
         following = arcs.next_arc[k]

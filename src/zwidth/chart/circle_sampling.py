@@ -76,7 +76,7 @@ def feature_memory(most: int, window: int) -> Features:
 
 @compiled_lean
 def _add_point(out: Features, re: float, im: float) -> None:
-    """Add the singular point s = re + i im unless it lies below the real axis, or is z = infinity."""
+    """Add the singular point s = re + i im unless it lies below the real axis, is z = infinity, or is too many."""
     n = out.counts[0]
     if im < -1e-12 or n >= len(out.points) or not np.isfinite(re + im):
         return
@@ -106,7 +106,7 @@ def _add_roots_of_quadratic(out: Features, a0: float, a1: float, a2: float) -> N
 
 @compiled_lean
 def _add_roots_of_polynomial(out: Features, p: Floats) -> None:
-    """Add the roots of a polynomial in ascending powers of s, to a thousandth of their size."""
+    """Add the roots of a polynomial in ascending powers of s; more than three to a thousandth of their size."""
     n = len(p) - 1
     if n > 3:
         spread_roots(out.roots[:n])
@@ -177,8 +177,9 @@ def fill_features(f: CircleFactors, polynomials: LoopPolynomials, out: Features)
 
 @compiled_lean
 def _fill_distances(radius: float, out: Features) -> None:
-    """Fill in z of each singular point, and `scales`: of distances on the circle to the points, and the least that
-    counts, NEAREST of a point's distance to the nearest other one, z = rho (theta = 0) among these."""
+    """Fill in z / rho of each singular point, and `scales`: of squared distances on the circle to the points, and
+    the square of the least that counts, NEAREST of a point's distance to the nearest other one, z = rho
+    (theta = 0) among these."""
     n = out.counts[0]
     for k in range(n):
         s = out.points[k]

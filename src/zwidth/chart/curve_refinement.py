@@ -38,7 +38,8 @@ ROUNDING_SIDE, ROUNDING_STEP = 1e-9, 1e-6
 
 @compiled_apart
 def refine_samples(memory: EdgeMemory) -> bool:
-    """Halve intervals between samples until none hides a loop or a change of sign; False where memory is full."""
+    """Halve intervals between samples until none hides a loop or a change of sign, or they are NARROWEST; False
+    where memory is full."""
     samples, most, doubtful, n = memory.samples, sum_of_coefficients(memory), 0, memory.counts[SAMPLES]
     clear, number = memory.picked[0], memory.picked_number
     _mark_clear_intervals(memory, clear)
@@ -46,7 +47,7 @@ def refine_samples(memory: EdgeMemory) -> bool:
         if clear[i] == 0.0:
             number[doubtful] = i
             doubtful += 1
-    # from the last one down, so that numbers before it stay
+    # from the last one down, so that numbers before it stay; last: how many samples lie behind the interval
     for k in range(doubtful - 1, -1, -1):
         i, last = number[k], memory.counts[SAMPLES] - number[k] - 1
         while i < memory.counts[SAMPLES] - last:
@@ -121,6 +122,7 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
     cK, cB = K[j] - K[i], B[j] - B[i]
     if not np.isfinite(uK + uB + wK + wB + cK + cB):
         return False
+    # a step of rounding size, in K and in B, hides nothing
     far = max(abs(uK), abs(wK), abs(cK)) > ROUNDING_STEP * abs(K[i])
     if not far and max(abs(uB), abs(wB), abs(cB)) <= ROUNDING_STEP * abs(B[i]):
         return False

@@ -88,7 +88,7 @@ def _fastest_by_searches(tracer: Tracer, outlines: list[Floats], least: Floats) 
         best = _search_cell(tracer, outline, least, best)
     for share in FASTER:
         for _ in range(ROUNDS):
-            radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + share) if best else 0.0
+            radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + share) if best else 0.0  # 0: end
             if not 0.0 < radius < 1.0:
                 break
             walls = _edge_walls(Tracer(tracer.loop, radius))
@@ -138,7 +138,8 @@ def _moved_to_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
 
 
 def _search_cell(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay | None) -> FastestDecay | None:
-    """Search a cell among walls with K, B >= least, from the best middles between points of its outline.
+    """Search a cell among walls with K, B >= least (ALL or QUADRANT), from the best middles between points of its
+    outline; in the quadrant also from its best walls on the axes.
 
     Returns  the faster-decaying of the wall found and `best`
     """
@@ -192,6 +193,7 @@ def _best_on_axis(tracer: Tracer, points: Floats, axis: int) -> Floats:
     rho = radii(places)
     lowest = np.flatnonzero((rho <= np.append(rho[1:], np.inf)) & (rho <= np.append(np.inf, rho[:-1])))
     best = places[np.argmin(rho)], rho.min()
+    # the interval round each local minimum is narrowed, the lowest first
     for k in lowest[np.argsort(rho[lowest])][:VALLEYS]:
         low, high = places[max(k - 1, 0)], places[min(k + 1, len(places) - 1)]
         for _ in range(ZOOMS):

@@ -51,7 +51,7 @@ PICKS: Final = 14  # walls of an edge between which starts are tried
 @compiled_apart
 def search_fastest(loops: LoopTable, i: int, memory: EdgeMemory) -> int:
     """Search the wall of smallest spectral radius of loop i: FOUND, with its K, B and radius in `fastest`; NO_WALL
-    where none is stable; DOUBTFUL where rounding hides it.
+    where none is stable; DOUBTFUL where rounding hides it, or ROUNDS do not reach it.
     """
     fastest = memory.fastest
     fastest[FASTEST_K], fastest[FASTEST_B], fastest[FASTEST_RADIUS] = np.nan, np.nan, np.inf
@@ -150,7 +150,7 @@ def _search_double_roots(loops: LoopTable, i: int, memory: EdgeMemory) -> None:
     """Of the walls with a double real root and another root as large, put the one that decays fastest into
     `fastest`, if there is one."""
     fill_without_singularities(loops, i, 1.0, memory)
-    if memory.circle.sizes[DEGREE] < 3:
+    if memory.circle.sizes[DEGREE] < 3:  # no other root
         return
     ratio = (FARTHEST / NEAREST) ** (1.0 / (RADII - 1))
     for root in (0.0, np.inf):
@@ -191,7 +191,7 @@ def _refine_at_double_root(loops: LoopTable, i: int, memory: EdgeMemory) -> None
 @compiled_lean
 def _fill_edge_walls(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> int:
     """Put the walls of the edge on a circle into rows of `picked`. Returns their number; -1 if rounding hides
-    one."""
+    one, or memory is full."""
     fill_loop(loops, i, radius, memory)
     if not fill_curve(memory, SHARE, LONGEST, NEAR_END):
         return -1

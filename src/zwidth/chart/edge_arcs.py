@@ -59,7 +59,8 @@ def fill_pair_arcs(memory: EdgeMemory) -> bool:
 
 @compiled_lean
 def _add_pair_arc(memory: EdgeMemory, low: int, high: int) -> bool:
-    """Add the arc of edge samples low to high; False where memory is full."""
+    """Add the arc of edge samples low to high, from corner to corner, or from and to the curve's ends; False where
+    memory is full."""
     samples, arcs, n = memory.samples, memory.arcs, memory.counts[SAMPLES]
     t = samples.t
     if low > 0:
@@ -129,7 +130,7 @@ def _add_pieces(memory: EdgeMemory, root: float) -> int:
     _, s, v = line_of(memory, root)
     T, pieces, nodes = memory.size[PERIOD], memory.pieces, memory.pieces.nodes
     length = np.hypot(s / T, v)
-    if not length > 0.0:
+    if not length > 0.0:  # no wall moves this root
         return 0
     # the direction with the stable side (gradient) on its left, in units of (K T, B)
     along_K, along_B = v / length, -s / T / length

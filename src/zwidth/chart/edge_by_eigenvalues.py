@@ -115,9 +115,11 @@ def arcs_of_rings(rings: EdgeRings) -> Arcs:
     """The arcs of rings as `Arcs`, ring after ring, their t = tan(theta/2) turned into angles."""
     arcs, t = rings
     order = arcs.order[: int(np.count_nonzero(arcs.next_arc >= 0))]
+    # number of each arc of a ring in the order of the walks
     place = np.empty(MOST_ARCS, dtype=np.int64)
     place[order] = np.arange(len(order))
     start, end = 2.0 * np.arctan(arcs.start[order]), 2.0 * np.arctan(arcs.end[order])
+    # samples of each arc in the order of its walk
     inner = [
         t[low:high] if forwards else t[low:high][::-1]
         for (low, high), forwards in zip(arcs.samples[order].tolist(), (start < end).tolist(), strict=True)
@@ -196,6 +198,7 @@ def find_arcs(tracer: Tracer, memory: EdgeMemory, share: float, added: Floats) -
     memory.size[EDGE_SIZE] = share  # read there by the first stage; the edge's size is not known yet
     _run(tracer, memory, SAMPLE, tracer.radius)
     if len(added):
+        # as many as there is room for
         t = np.union1d(samples.t[: counts[SAMPLES]], added)[: len(samples.t) - 1]
         samples.t[: len(t)] = t
         counts[SAMPLES] = len(t)
@@ -230,7 +233,7 @@ def find_arcs(tracer: Tracer, memory: EdgeMemory, share: float, added: Floats) -
 def decide_flags(tracer: Tracer, thetas: Floats, K: Floats, B: Floats, flags: NDArray[np.int8]) -> None:
     """Decide flags that are HIDDEN, by eigenvalues. Where they, or in a long loop the phase along the circle,
     leave one open, too (several roots on the circle within rounding), it is that of the nearest decided sample
-    before, or after if there is none."""
+    before, or after if there is none; all stay HIDDEN where none is decided."""
     unsure = np.flatnonzero(flags == HIDDEN)
     if not len(unsure):
         return
@@ -337,8 +340,8 @@ def _walls_along_arc(tracer: Tracer, arc: Arc) -> Floats:
 
 
 def _samples_around_corners(memory: EdgeMemory) -> Floats:
-    """Places t (k,) close to each known corner, and crossing of a line, on both sides, and halfway between
-    neighbours."""
+    """Places t (k,) close to each corner, on both of its branches, and to each crossing of a line, on both sides,
+    and halfway from one of these to the next."""
     samples, arcs, n = memory.samples, memory.arcs, int(memory.counts[SAMPLES])
     curved = np.flatnonzero(arcs.kind[: memory.counts[ARCS]] == PAIR)
     settled = np.flatnonzero(samples.corner[: n - 1] != NONE)
@@ -354,7 +357,7 @@ def _samples_around_corners(memory: EdgeMemory) -> Floats:
 
 def bridge_gaps(tracer: Tracer, memory: EdgeMemory) -> float | None:
     """Add a chord from each open end to the nearest open beginning, and return the longest chord's share of the
-    size; None if an end finds no partner or a chord leaves the circle.
+    size; None if no end is open, if one finds no partner, if memory is full or if a chord leaves the circle.
 
     Where the velocity estimate is all but blind, or a mode all but unmoved, a whole piece of edge passes within
     rounding of a single angle: its samples stop short of its corners. What is missing is a chord between two open

@@ -75,10 +75,12 @@ class EdgeChords:
         arc between two turns once crosses the one chord, too, and near a turn no crossing is lost.
         """
         joined = np.all(self.first[1:] == self.last[:-1], axis=1)
+        # chords of a line of real roots, and in which quarter of the plane each chord leads
         straight = self.frequency[:, 0] == self.frequency[:, 1]
         way = np.sign(self.last - self.first)
         on = joined & (straight[1:] == straight[:-1]) & np.all(way[1:] == way[:-1], axis=1)
         begins = np.append(True, ~on)[: len(self)]
+        # number of each chord in its run
         along = np.arange(len(self)) - np.maximum.accumulate(np.where(begins, np.arange(len(self)), 0))
         start = np.flatnonzero(along % count == 0)
         end = np.append(start[1:], len(self)) - 1
@@ -112,6 +114,7 @@ class EdgeChords:
         # left, stable, of a chord towards larger K are the walls above it; towards larger B the softer ones
         if edge is not None:
             crossed &= (x1 > x0) == (edge != "upper")
+        # of each crossing: its line, its chord, and the stiffness, or of a tip the damping, that both have there
         line, chord = np.nonzero(crossed)
         along = at[line, 0]
         share = (along - x0[chord]) / (x1[chord] - x0[chord])

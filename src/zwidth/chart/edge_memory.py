@@ -72,14 +72,14 @@ class Samples(NamedTuple):
 class EdgeArcs(NamedTuple):
     """Arcs of the edge; memory for MOST_ARCS.
 
-    kind          (a,)    PAIR, PLUS or MINUS of `arcs`
+    kind          (a,)    PAIR, PLUS or MINUS of `arcs`; CHORD where one bridges a gap
     first, last   (a, 2)  their walls [K, B], the stable side on the left from first to last
     start, end    (a,)    t there; 0 or inf for a real root
     samples       (a, 2)  the samples strictly between the ends: index of the first, and behind the last
-    extent        (a,)    largest distance of its walls from its first, in K T and B
+    extent        (a,)    largest distance of its walls from its first, in K T and B; inf for a CHORD
     node          (a, 2)  numbers of the corners that it begins and ends in
     order         (a,)    arcs ring after ring
-    next_arc      (a,)    the arc after each; -1 for one that is no more than a corner
+    next_arc      (a,)    the arc after each; -1 for one that is no more than a corner, less while they are joined
     """
 
     kind: Bytes

@@ -189,6 +189,7 @@ def flag_quadrant(memory: EdgeMemory) -> None:
     """Flag the samples with K > 0 and B >= 0, and their neighbours; all others stay UNKNOWN."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     K, B, picked, number = samples.K, samples.B, memory.picked, memory.picked_number
+    # before, here, after: whether the sample before this one, it and the next one are in the quadrant
     m, before, here = 0, False, K[0] > 0.0 and B[0] >= 0.0
     for i in range(n):
         after = i < n - 1 and K[i + 1] > 0.0 and B[i + 1] >= 0.0

@@ -175,7 +175,7 @@ class SampledResponse:
         """The sampled response of a loop, its far aliases summed beforehand."""
         reference = replace(loop, plant=viscous_equivalent(loop.plant))
         hysteretic, viscous = ModalPlant.of(loop.plant), ModalPlant.of(reference.plant)
-        rates = np.concatenate([hysteretic.natural_rates(), viscous.natural_rates(), [0.0]])
+        rates = np.concatenate([hysteretic.natural_rates(), viscous.natural_rates(), [0.0]])  # and at rest
         folds = rates * loop.period / (2.0 * np.pi)  # natural frequencies in sampling rates
         most = FEWEST + int(PER_FOLD * np.max(folds))
         k = np.arange(-most, most + 1)
@@ -228,7 +228,7 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
     """The stable walls of a loop whose plant has a loss factor (`Plant.hysteresis`).
 
     Returns  MeasuredChart; what it calls measured is computed here, to 1e-9, at as many frequencies as it takes
-    Raises   HysteresisError  where the loss factor is below 1e-5, or too small for this loop to be charted
+    Raises   HysteresisError  for no loss factor, one below 1e-5 or too small for this loop, or a fixed feedback
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
@@ -281,7 +281,8 @@ def _response(loop: Loop) -> Response:
 def _refine_angles(
     sampled: SampledResponse, thetas: Floats, P: Complexes, integrators: int
 ) -> tuple[Floats, Complexes]:
-    """The angles and P (n,) there, refined until P is interpolated to INTERPOLATION_ERROR in every middle."""
+    """The angles and P (n,) there, refined until P is interpolated to INTERPOLATION_ERROR and its rounding in each
+    middle, steps are FINEST, or there are MOST_SAMPLES."""
     # steps between two angles whose middle is not yet known to be interpolated well
     unsure = np.ones(len(thetas) - 1, dtype=bool)
     while unsure.any() and len(thetas) < MOST_SAMPLES:
@@ -466,8 +467,8 @@ def moved_arcs(
 
     lines    h and w of the lines of real roots K + B w = h, by `arcs.PLUS` and `arcs.MINUS`
     size     (2,) of the edge [N/m, N s/m]
-    Returns  None where a corner is not found near the former one, or an arc would run backwards: the edges differ
-             in their arcs then
+    Returns  None where a corner is not found near the former one, or an arc would run backwards or is of another
+             kind: the edges differ in their arcs then
     """
     if not np.isin(arcs.kind, (PAIR, PLUS, MINUS)).all():
         return None

@@ -207,7 +207,7 @@ class LoopEdge:
             tracer, rings_of(memory), SAME_CORNER, peak, float(numbers[LARGEST_DAMPING]), float(numbers[AREA])
         )
         if tracer.loop.has_states_apart:
-            edge.traced  # noqa: B018  # no number of factors that have lost digits is given
+            edge.traced  # noqa: B018  # judged at once: no number of factors that have lost digits is given
         return edge
 
     @classmethod
@@ -344,7 +344,7 @@ def crossed_between_samples(tracer: Tracer, memory: EdgeMemory) -> Floats:
 
 
 def walls_off_circle(tracer: Tracer, edge: TracedEdge, corners: bool) -> OffCircle:
-    """Those of an edge's points whose largest root is not on the circle.
+    """Those of an edge's points whose largest root is not on the circle; of straight arcs their ends alone tell.
 
     corners  whether corners are known well enough to be judged, too: False where rounding blurs them
     """

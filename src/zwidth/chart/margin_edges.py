@@ -40,7 +40,7 @@ class EdgeNodes(NamedTuple):
     K, B, t  (n,)  the walls, and tan(theta/2) of those on a curve
     piece  (n,)  from this node to the next: NO_PIECE, CURVE or STRAIGHT
     loop   (n,)  number of the loop
-    turn   (n,)  1 at the end of an arc and where K turns
+    turn   (n,)  1 at the end of an arc and where K turns, on a curve also where B does; 0 in copies of pieces
     parts  (p, 2)  least and largest damping of each connected part of the edges within a strip
     gap    (2,)    dampings of the walls that fitted last: between these no edge enters the strip
     """
@@ -291,7 +291,7 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
             parts[i, 0], parts[i, 1] = parts[i - 1, 0], parts[i - 1, 1]
             i -= 1
         parts[i, 0], parts[i, 1] = least, largest
-    top = 0.0
+    top = 0.0  # largest damping of the parts so far, 0 at least
     for k in range(m):
         bottom = parts[k, 0]
         # B / b and B b both fit into the gap if its ends are b^2 apart
@@ -330,8 +330,8 @@ def copy_pieces_near(
 
 @compiled_apart
 def fits_about(close: EdgeNodes, K: float, factor: float, damping_factor: float, middle: float) -> bool:
-    """`fits` for the one gap round the damping `middle`, by the pieces close to it alone; False where one of them
-    reaches `middle`. The gap goes into `close.gap`."""
+    """`fits` for the one gap round the damping `middle`, by the pieces close to it alone; False, too, where one of
+    them reaches `middle`, with the gap as it was. Else the gap goes into `close.gap`."""
     low, high, below, above = K / factor, K * factor, 0.0, np.inf
     for i in range(close.used[0] - 1):
         if close.piece[i] == NO_PIECE:

@@ -186,7 +186,8 @@ def phase_flags(
     pairs: Floats,
     real: int,
 ) -> Ints:
-    """Whether walls (n, 2) have all roots inside but those divided out: 1, -1, or 0 where rounding hides it.
+    """Whether walls (n, 2) have all roots inside but those divided out: 1, -1, or 0 where rounding hides it;
+    -1 for walls at infinity.
 
     thetas, terms  samples of the circle, and `terms_along` them
     degree         N

@@ -59,7 +59,8 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
              these have no sections either, so that all loops that have some are known to rounding
     Returns  None where that holds of every point: a measured response, a given plant of a single design or one
              that is reduced, encoders on the links in a reduced model, a computer with fixed feedback, a load,
-             flexible links, a mechanism that is not plain (`effective_mass.is_plain`) in a reduced model
+             flexible links, a mechanism that is not plain (`effective_mass.is_plain`) in a reduced model, an arm
+             or an operator who holds more than the rendered direction; for coupled False any operator who moves
     """
     found = tables_of_points(point, [point.controller], coupled)
     return None if found is None else found[0]
@@ -127,6 +128,7 @@ def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = Tr
         return modes.pairs
     if not coupled:
         return replace(modes.pairs, reach=np.where(modes.coupled, np.nan, modes.pairs.reach))
+    # a period for each of these points, or one for all
     rows = np.flatnonzero(modes.coupled)
     periods = period[rows] if len(period) > 1 else period
     return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, periods))
@@ -159,7 +161,7 @@ def _modes_without_operator(point: OperatingPoint, model: Model) -> RenderedMode
     if not is_plain(point.mechanism):
         return modes_in_general(point.mechanism, point.posture, point.direction, point.damping, point.encoders)
     modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)
-    assert modes is not None  # `table_of_points` has looked at the encoders
+    assert modes is not None  # the callers have looked at the encoders
     return modes
 
 

@@ -158,8 +158,8 @@ def largest_stiffness_by_direction(
     plant = _plant_by_direction(point)
     motions = _basis_of_motions(point.jacobian)
     keys = [_direction_key(unit, point.load is not None) for unit in units]
-    first = {key: n for n, key in reversed(list(enumerate(keys)))}  # one of each pair
-    # how much of each direction is left outside of the handle's motions
+    first = {key: n for n, key in reversed(list(enumerate(keys)))}  # number of the first with each key
+    # which directions lie outside of the handle's motions
     off = np.linalg.norm(units - units @ motions.T @ motions, axis=1) > OUT_OF_MOTION_TOLERANCE
     wanted = [n for n in first.values() if not off[n]]
     in_batch = _stiffest_in_batch(point, units[wanted])

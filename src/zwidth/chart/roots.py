@@ -57,7 +57,7 @@ def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
                 if j != i and gap != 0.0:
                     pull += divide(one, gap)
             step = divide(newton, one - newton * pull)
-            if not (abs(step.real) + abs(step.imag) < 1e300):
+            if not (abs(step.real) + abs(step.imag) < 1e300):  # no number: this root stays for now
                 step = complex(0.0, 0.0)
             roots[i] = s - step
             largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
@@ -76,7 +76,7 @@ def real_root(p: Floats) -> float:
     # s = y - a/3:  y^3 + 3 q y + 2 r = 0
     q, r = b / 3.0 - third * third, 0.5 * c + third * (third * third - 0.5 * b)
     under = q * q * q + r * r
-    if under > 0.0:
+    if under > 0.0:  # one real root; else three
         u = np.cbrt(abs(r) + np.sqrt(under))
         y = q / u - u if r > 0.0 else u - q / u
     else:

@@ -78,7 +78,7 @@ def _radii(loops: LoopTable, which: Ints, K: Floats, B: Floats, leverage: bool) 
         finite = np.isfinite(L).all(axis=(-2, -1))
         z = np.linalg.eigvals(L[finite]).astype(np.complex128)
         radii[walls[finite]] = np.abs(z).max(axis=-1)
-        soft = finite & (K[walls] == 0.0)
+        soft = finite & (K[walls] == 0.0)  # without stiffness a root z = 1 may be nobody's position
         if np.any(soft):
             radii[walls[soft]] = _radii_without_positions(loops, which[walls[soft]], z[soft[finite]])
         if leverage:

@@ -284,7 +284,7 @@ def _refined_angles(circle: CircleFactors, nodes: Floats, tolerance: float, most
     tolerance, a share of the extent in K and in B; no more than `most` are added to the nodes.
 
     The sag of a chord over a step h is h^2/8 times the second derivative; the middle of each interval measures it,
-    and n equal pieces divide it by n^2.
+    and n equal pieces, 200 at most, divide it by n^2.
     """
     n = len(nodes)
     K, B = np.empty(2 * n - 1), np.empty(2 * n - 1)

@@ -157,10 +157,12 @@ def _unheld(loop: Loop | MultiLoop, K: Floats) -> Ints:
 
 
 def _judge_batch(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.int8], Floats, Floats, Floats]:
-    """Verdict, frequency, spectral radius and half-width of the undecided band of walls (k,)."""
+    """Verdict, frequency, spectral radius and half-width of the undecided band of walls (k,): undecided, nan, nan
+    and BAND where a wall or its transition matrix is not finite."""
     finite = np.isfinite(K) & np.isfinite(B)
     with np.errstate(over="ignore", invalid="ignore"):
         L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
+    # 0 stands for what is not finite, until nan does
     finite &= np.all(np.isfinite(L), axis=(-2, -1))
     L = np.where(finite[..., None, None], L, 0.0)
     z = np.linalg.eigvals(L).astype(complex)
@@ -207,6 +209,7 @@ def _balance(L: Floats) -> Floats:
     for _ in range(30):
         settled = True
         for i in range(len(A)):
+            # sizes of a column and of its row, without the diagonal, which a similarity does not change
             column = np.sum(np.abs(A[:, i])) - abs(A[i, i])
             row = np.sum(np.abs(A[i])) - abs(A[i, i])
             if column > 0.0 and row > 0.0:
@@ -242,7 +245,7 @@ def distances_from_circle(
     band: float = BAND,
 ) -> Floats:
     """How far outside the circle |z| = radius the largest root of walls K, B (k,) is, negative inside; 0 for one
-    that is there, but for rounding, or within a band of it."""
+    that is there, but for rounding, or within a band of it, or whose mean with another one close by is."""
     K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
     away = np.zeros(len(K))
     for first in range(0, len(K), AT_ONCE):

@@ -149,7 +149,7 @@ def _fill_several(
                 continue
             memory.nodes.used[0] = 0
             for d in range(delays):
-                at = d * BLOCK + i - begin
+                at = d * BLOCK + i - begin  # number of this edge in the pool
                 if not copy_nodes(memory.pool, memory.ends[at], memory.ends[at + 1], memory.nodes):
                     status[i] = DOUBTFUL
             if status[i] != FOUND:
@@ -180,14 +180,14 @@ def _fill_edges(
     status: NDArray[np.uint8],
 ) -> None:
     """Put edges of devices begin to end - 1, of N at so many delays, in the pool: of all of them at one delay
-    after the other, since what the computer alone decides is then computed once. NO_WALL where there is none at
-    one of the delays."""
+    after the other, since what the computer alone decides is then computed once. A
+    status stays NO_WALL or DOUBTFUL where that of one of the delays is."""
     pool, ends = memory.pool, memory.ends
     pool.used[0], ends[0] = 0, 0
     for i in range(begin, end):
         status[i] = FOUND
     for d in range(delays):
-        for i in range(begin, begin + BLOCK):
+        for i in range(begin, begin + BLOCK):  # beyond `end`, too, where `ends` has edges without nodes
             at = d * BLOCK + i - begin
             if i < end and status[i] == FOUND:
                 status[i] = _add_edge_of(loops, i + d * N, d, memory)
@@ -208,11 +208,13 @@ def _add_edge_of(loops: LoopTable, number: int, d: int, memory: MarginMemory) ->
 
 @compiled_apart
 def _stiffest_fit(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floats) -> float:
-    """Stiffness [N/m] of the stiffest wall that fits between the edges; 0 if none does.
+    """Stiffness [N/m] of the stiffest wall that fits between the edges, to COARSE; 0 if none does. Its gap is in
+    `nodes` then.
 
     a, b   the factors by which stiffness and damping may be off
     tried  working memory for stiffnesses
     """
+    # top: stiffer walls have their strip outside the edge at one of the delays
     n, top = nodes.used[0], np.inf
     for d in range(delays):
         largest = 0.0
@@ -295,15 +297,15 @@ def _refined_stiffness(
     loops: LoopTable, i: int, N: int, delays: int, memory: MarginMemory, a: float, b: float, stiffness: float
 ) -> tuple[float, bool]:
     """The stiffness solved again with nodes where the strip's sides cross the curves, until it does not change;
-    and whether it settled. Where the gap is wide, only with the pieces close to it. Its gap goes into
-    `memory.close`.
+    and whether it settled. Where the gap is wide and begins above B = 0, first with the pieces close to it alone,
+    which mostly settles it. Its gap goes into `memory.close`.
 
     a, b  the factors by which stiffness and damping may be off
     """
     if stiffness == 0.0:
         return 0.0, True
-    low, high = memory.nodes.gap[0], memory.nodes.gap[1]
-    # a gap above B = 0 may close altogether, one between two dampings cannot
+    low, high = memory.nodes.gap[0], memory.nodes.gap[1]  # dampings of the gap
+    # others may close altogether
     if b > NARROW and low > 0.0:
         middle = _damping_in_gap(memory.nodes, b)
         near = stiffness * (1.0 - BESIDE) / a, stiffness * (1.0 + BESIDE) * a
@@ -332,7 +334,8 @@ def _settled_stiffness(
     middle: float,
     stiffness: float,
 ) -> tuple[float, bool]:
-    """`_refined_stiffness` with the pieces in `nodes`, whose crossings it adds: stiffness, and whether it settled.
+    """`_refined_stiffness` with the pieces in `nodes`, whose crossings it adds: stiffness, and whether it settled;
+    False where memory is full or no change is found, True after ROUNDS, however much the last one changed it.
 
     middle  as for `_largest_fit_between`
     """
@@ -386,6 +389,7 @@ def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float,
     nodes = edge_nodes(size, size)
     for d, each in enumerate(outlines):
         for outline in each:
+            # at which points but the first and the last K turns
             turns = np.append(0, np.diff(np.sign(np.diff(outline[:, 0])))) != 0
             for n, (K, B) in enumerate(outline.tolist()):
                 piece = STRAIGHT if n < len(outline) - 1 else NO_PIECE

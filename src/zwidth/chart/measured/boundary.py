@@ -63,7 +63,8 @@ class Boundary:
 
 
 def first_measured_angles(loop: MeasuredLoop) -> Floats:
-    """The measured angles, three between each two, and angles that close in on ends and asymptotes."""
+    """The measured angles, three between each two, and angles that close in on 0, asymptotes and, where the
+    response is taken on to it, pi."""
     measured = loop.angles_below_pi
     shares = np.arange(4) / 4.0
     inner = (measured[:-1, None] + np.diff(measured)[:, None] * shares).ravel()
@@ -72,6 +73,7 @@ def first_measured_angles(loop: MeasuredLoop) -> Floats:
     if loop.interpolation.closed:
         parts.append(np.pi - closing[::-1] * (np.pi - measured[-1]))
     angles = np.unique(np.concatenate(parts))
+    # among these it is seen where Im w changes sign
     dense = np.union1d(angles, np.linspace(angles[0], loop.largest_angle, 4097)[:-1])
     for low, high in _brackets_of_real_estimate(loop, dense):
         # up to a thousandth of the asymptote's angle away from it on both sides
@@ -131,7 +133,8 @@ def _bisect_chords(
     scales: Callable[[Floats], Floats],
     tolerances: Callable[[Floats, Floats, Floats], Floats],
 ) -> Floats:
-    """The angles, and middles between them added until each chord passes its middle on the curve closely enough.
+    """The angles, and middles between them added until each chord passes its middle on the curve closely enough,
+    or MOST are reached. No chord leads past an asymptote or to a wall beyond FAR.
 
     scales      function of angles (n,): what counts as one unit of K and of B there (n, 2)
     tolerances  function of both ends and the middle of chords, (n, 2) each, in (walls - low) / scale: the
@@ -187,6 +190,7 @@ def sample_boundary(loop: MeasuredLoop, angles: Floats, reference_boundary: Boun
     K, B, orientation = loop.walls(angles)
     segments, jumps = curve_segments(K, B, orientation)
     whole = np.isfinite(K) & np.isfinite(B)
+    # `angle_index` of the curve, joined as in `curve_segments`; then what ends it on both sides
     at = np.flatnonzero(whole[:-1] & whole[1:] & (orientation[:-1] == orientation[1:]))
     far = FAR * float(large_wall_scale(loop)[1])
     more = [_real_line(loop, angles[0], -1, far)]
@@ -229,6 +233,9 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
 
     On it D = K + B w - h = 0. The root moves by -dK / D', and D' (z = +-1) has the sign of -+(B Im w - Im h)
     at an angle just beside.
+
+    near  that angle, the curve's first or last;  far  how far the line is drawn in B
+    kind  as for `measured_real_root`; nothing is returned (of length 0) where there is no such line
     """
     h, w = measured_real_root(loop, kind)
     if not np.isfinite(h):
@@ -312,10 +319,12 @@ def _clear_walls(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Flo
     """
     size = np.max(walls / np.min(walls, axis=0), axis=1)
     seeming = clearness(loop, angles[:: max(1, len(angles) // SOME_ANGLES)], walls)
+    # from the clearest on; and of those that seem clear from the smallest on
     order = np.argsort(-seeming)
     smallest = np.argsort(np.where(seeming > CLEAR, size, np.inf), kind="stable")[: np.sum(seeming > CLEAR)]
     chosen = np.union1d(order[:LIKELY], smallest[:SURE])
     counts, clear = nyquist_count(loop, angles, walls[chosen])
+    # more of the smallest, until enough of them are clear at every angle
     tried = SURE
     while tried < len(smallest) and np.sum(clear[np.isin(chosen, smallest[:tried])] > CLEAR) < SURE:
         more = np.setdiff1d(smallest[tried : 2 * tried], chosen)
@@ -331,9 +340,10 @@ def _with_reference(loop: MeasuredLoop, curve: Boundary) -> Boundary:
     A small one, since on the way from a wall many powers of ten beyond the stable ones their digits are lost; the
     clearest one where the data end early. The counts of the clearest walls must agree with it.
 
-    Raises  ResponseError  where most of them do not
+    Raises  ResponseError  where most of them do not, or where its own count is below 0
     """
     h, w = np.abs(loop.h(loop.angles_below_pi)), np.abs(loop.w(loop.angles_below_pi))
+    # walls of all sizes that the response has, but where the data end early of the larger ones
     sizes = np.geomspace(1e-3, 3.0, 9)
     shares = [0.0, 0.05, 0.25, 0.5, 0.75] if loop.interpolation.closed else [0.25, 0.5, 0.75]
     K = np.quantile(h, shares)[:, None] * sizes

@@ -210,7 +210,8 @@ def edge_frequencies(chart: MeasuredChart) -> EdgeFrequencies | None:
 
 
 def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[float]:
-    """The largest stiffness [N/m] of each repeated sweep as it was measured; nan where none is certain.
+    """The largest stiffness [N/m] of each repeated sweep as it was measured; nan where it has no credible
+    cell, where these do not close, or where it is none of a device.
 
     Each is as far from the truth as their mean times the square root of their number.
     """
@@ -264,10 +265,13 @@ def _edge_distances(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) ->
 
 
 def _stable_regions(loop: MeasuredLoop) -> tuple[StableRegions | None, bool]:
-    """The stable cells, and whether the boundary closes them: if not, they reach the window's edge.
+    """The stable cells, None if there is no credible one, and whether the boundary closes them: if not, they reach
+    the window's edge.
 
     Open ones are looked at in larger windows first. Where some are noise, the others are drawn again in a window
     of their own, with finer chords.
+
+    Raises  ResponseError  where all are noise, and no error is known
     """
     known = sample_boundary(loop, coarse_angles(loop))
     box = window_of_regions(loop, known)
@@ -292,10 +296,11 @@ def _stable_regions(loop: MeasuredLoop) -> tuple[StableRegions | None, bool]:
 
 
 def _empty_chart(loop: MeasuredLoop) -> MeasuredChart:
-    """The chart of a device without a wall that is stable for certain.
+    """The chart of a device without a credible cell of stable walls.
 
     Raises  ResponseError  where no error is known, and the data end before any edge
     """
+    # a stretch that begins at the last usable frequency
     ends_early = any(stretch.low == loop.response.frequency[loop.usable][-1] for stretch in loop.unusable)
     if ends_early and loop.errors is None:
         raise ResponseError(_no_edge_message(loop))
@@ -333,7 +338,7 @@ def _chart_of_cells(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> M
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
     angles = angles_at_wall(zoomed, peak)
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
-    # as K = Re h - Im h Re w / Im w, an error of h moves K by up to |w / Im w| times its size
+    # errors of K there: as K = Re h - Im h Re w / Im w, an error of h moves K by up to |w / Im w| times its size
     h, w = loop.h(at_peak), loop.w(at_peak)
     errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
     certain, band = _within_error(loop, cells, zoomed, CertainWall(*peak, tuple(angles)), opened)
@@ -369,7 +374,8 @@ def _within_error(
 
     The nominal one and None where no error is known; none and None where the edge is open.
 
-    zoomed  the cells round the stiffest nominal wall
+    cells, zoomed    in their own window, and in one round the stiffest nominal wall
+    nominal, opened  that wall, and whether the edge is open
     """
     doubt = doubt_along(loop, cells.edge, cells.box)
     if doubt is None:
@@ -468,10 +474,13 @@ def _mark_on_edge(loop: MeasuredLoop, cells: StableRegions) -> Iterator[Unusable
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
     f = edge.angles / (2.0 * np.pi * loop.period)
     for stretch in loop.unusable:
+        # which angles are in the stretch; one more, False, is what an index of -1, a line's, would find
         within = np.zeros(len(f) + 1, dtype=bool)
         within[:-1] = (f >= stretch.low) & (f < stretch.high)
         which = np.flatnonzero((edge.angle_index >= 0) & within[edge.angle_index])
+        # some two hundred of its chords tell
         touched = bool(np.any(has_stable_inner_side(edge, which[:: max(1, len(which) // 200)], scale)))
+        # beyond the data there are no chords: open cells have their edge there
         beyond = not loop.interpolation.closed and stretch.high >= 0.5 / loop.period * (1.0 - 1e-9)
         yield replace(stretch, on_edge=touched or (beyond and cells.open))
 
@@ -493,6 +502,7 @@ def modelled_point(point: OperatingPoint) -> OperatingPoint:
     document = fit_document(point)
     both = [document[key] for key in ("stiffness_max_N_per_m", "stiffness_max_of_response_N_per_m")]
     by_fit, by_data = both
+    # both are nan where neither has a stable wall
     if not (by_data / FURTHEST <= by_fit <= by_data * FURTHEST or all(map(isnan, both))):
         fitted, measured = ("none" if isnan(K) else f"{K:.4g} N/m" for K in both)
         raise ResponseError(
@@ -525,7 +535,7 @@ TRIED: Final = 0.5  # share of the largest stiffness at which the error is looke
 
 def hidden_walls(chart: MeasuredChart) -> str:
     """What a chart without any certain wall would have without errors, and where these are too large; "" where no
-    wall is stable by the response as it was measured either, or no error is known.
+    wall is stable by the response as it was measured either, where that has no chart, or where no error is known.
 
     Where: the frequency that leaves the wall of half the largest stiffness most in doubt.
     """

@@ -60,7 +60,8 @@ class Doubt:
 
     def clearance(self, wall_stiffness: float, wall_damping: float) -> tuple[Floats, Floats]:
         """Distance of a wall from doubt, over |c|, below 0 in doubt, and at which angle: (2 k - 1,) each, in turn
-        at one of the angles and at the place between it and the next where the distance is least."""
+        at one of the angles and at the place between it and the next where the distance is least, inf where these
+        are not joined."""
         c = wall_stiffness + wall_damping * self.velocity
         F, reach, share, away = self._distances_on_way(np.array([[wall_stiffness, wall_damping]]))
         size = np.maximum(np.abs(c), 1e-300)
@@ -87,7 +88,7 @@ class Doubt:
         them that can hide that a wall is stable."""
         step = max(1, CHUNK // len(self.angles))
         parts = [self._stretches(walls[i : i + step]) for i in range(0, len(walls), step)]
-        none = np.empty(0, dtype=np.int64)
+        none = np.empty(0, dtype=np.int64)  # for no walls at all
         return (
             np.concatenate([*(part[0] for part in parts), none]),
             np.concatenate([*(part[1] for part in parts), none]),
@@ -119,6 +120,7 @@ class Doubt:
         """
         turned = np.cumsum(np.angle(F[:, 1:] * np.conj(F[:, :-1])), axis=1)
         turned = np.concatenate([np.zeros((len(F), 1)), turned], axis=1)
+        # turning from the angle before the stretch to that after it
         before, after = np.maximum(first - 1, 0), np.minimum(last + 1, len(self.angles) - 1)
         clockwise = turned[wall, after] < turned[wall, before]
         at_end = (first == 0) | (last == len(self.angles) - 1)
@@ -148,8 +150,10 @@ def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
     if loop.interpolation.closed:
         parts.append(_doubt_at_real_root(loop, -2))
     columns = [np.concatenate([np.atleast_1d(part[i]) for part in parts]) for i in range(6)]
+    # without angles at which h is 0 or infinite
     good = np.isfinite(columns[1]) & np.isfinite(columns[2])
     angles, scale, response, w, radius, rest = (column[good] for column in columns)
+    # real roots and both sides of an asymptote are not joined
     curve = (angles > 0.0) & (angles < np.pi)
     joined = curve[1:] & curve[:-1] & (np.sign(w.imag[1:]) == np.sign(w.imag[:-1]))
     return Doubt(angles, scale.real, response, w, radius.real, rest.real, joined)
@@ -215,11 +219,12 @@ def judge_measured(
 ) -> MeasuredVerdicts:
     """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
 
-    A wall that the measurement's error leaves in doubt at some frequency is not called stable. It is called
-    unstable if it has more roots outside than the two that each stretch of such frequencies can add; else it is
-    undecided. So is one of many walls that is not finite; a single one raises ValueError.
+    A wall that the measurement's error leaves in doubt at some frequency is not called stable. Any wall is called
+    unstable if it has more roots outside than two for each stretch of frequencies that can hide that it is stable;
+    else it is undecided. So is one of many walls that is not finite; a single one raises ValueError.
 
-    doubt  None where no error is known
+    doubt    None where no error is known
+    nearest  from which frequencies are read; None where nothing is stable
     """
     K, B = broadcast_walls(wall_stiffness, wall_damping)
     walls = np.column_stack([K.ravel(), B.ravel()])

@@ -59,7 +59,7 @@ class MeasuredLoop:
         """Choose the usable frequencies.
 
         Raises  ResponseError  where they are too few or too high, or where the controller holds what the response
-                               holds already
+                               holds already, or what only a model can tell
         """
         if self.controller.fixed_feedback:
             raise ResponseError(
@@ -142,7 +142,8 @@ class MeasuredLoop:
         return low_frequencies(self.response)
 
     def _continued_down(self) -> tuple[Floats, Complexes]:
-        """Angles below the data and P there, from the fit; none where the phase has settled, or nothing fits."""
+        """Angles below the data and P there, from the fit; none where the phase has settled, or nothing fits, or
+        what would rule P there is not positive."""
         m, f = self.integrators, self.response.frequency[self.usable][0]
         P = self.response.value[self.usable][0]
         none = np.empty(0), np.empty(0, dtype=complex)
@@ -280,7 +281,8 @@ class MeasuredLoop:
         """How far the true h may be from the interpolated one at angles (...) below the data [N/m].
 
         Of what is fitted to the lowest frequencies, with all its terms: whether there is a weak spring or a weak
-        dashpot to the ground is a part of it. Where nothing fits, as much as h at the lowest frequencies.
+        dashpot to the ground is a part of it. Where nothing fits, as much as h at the lowest frequencies. 0 where
+        no error is known.
         """
         theta = np.asarray(theta)
         if self.error_nodes is None:
@@ -337,6 +339,7 @@ def unusable_ranges(
     half = 0.5 / period
     m = interpolation.integrators
     phase = float(np.angle(response.value[good][0] * around_one(theta[0]) ** m))
+    # halfway from 0 to the first angle, and between each two
     errors = interpolation.relative_error(0.5 * (np.append(0.0, theta[:-1]) + theta))
     if abs(phase) > LARGEST_PHASE or errors[0] > COARSEST:
         yield UnusableRange(
@@ -359,7 +362,8 @@ def unusable_ranges(
 
 
 def _incoherent_stretches(response: Response, good: Flags) -> Iterator[UnusableRange]:
-    """Stretches of frequencies that are not `good` (n,), each from the good one before to that after it."""
+    """Stretches of frequencies that are not `good` (n,), up to SAME_STRETCH from one to the next, each from the
+    frequency before (0 if there is none) to that after (the last itself if there is none)."""
     for run in _groups_of_true(~good, SAME_STRETCH):
         low = response.frequency[run[0] - 1] if run[0] > 0 else 0.0
         high = response.frequency[min(run[-1] + 1, len(good) - 1)]
@@ -380,6 +384,7 @@ def _unmeasured_stretches(f: Floats, errors: Floats) -> Iterator[UnusableRange]:
     """Stretches of f (n,) [Hz] where nothing was measured, or where interpolation between neighbours leaves too
     large a relative error of P: errors (n - 1,)."""
     spacing = np.diff(f)
+    # the usual spacing about each interval
     around = np.array([np.median(spacing[max(0, i - 5) : i + 6]) for i in range(len(spacing))])
     empty = (spacing > WIDEST_GAP * around) & (f[1:] > WIDEST_RATIO * f[:-1])
     coarse = (errors > COARSEST) & ~empty

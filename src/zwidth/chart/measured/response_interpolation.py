@@ -96,6 +96,7 @@ def interpolate_response(
                            it: noise of the last points alone would say that there is one
     straight               (n - 1,) between which angles G is taken straight, its `error` then 0: curves through
                            noise run away
+    Raises                 ResponseError  for fewer than FEWEST angles
     """
     if len(theta) < FEWEST:
         raise ResponseError(
@@ -129,6 +130,7 @@ def _with_mirror_images(theta: Floats, G: Complexes, closed: bool) -> tuple[Floa
         at_end = np.pi - theta[-1] < 1e-9
         if at_end:  # G is real at pi, and not 0, which has no logarithm
             values[1] = np.append(G[:-1], G[-1].real or 1e-15 * abs(G[-2]))
+        # pi is its own image
         near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
         nodes.append(2.0 * np.pi - theta[near])
         values.append(np.conj(G[near]))

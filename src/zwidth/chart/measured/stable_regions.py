@@ -93,6 +93,7 @@ def regions_within(loop: MeasuredLoop, known: Boundary, box: Window) -> StableRe
     edge = sample_boundary(loop, refine_angles(loop, known.angles, box, CHORD), known)
     K0, K1, B0, B1 = box
     low, scale = np.array([K0, B0]), np.array([K1 - K0, B1 - B0])
+    # in units of the window, whose frame goes from 0 to 1 then
     chords = _chords(edge, low, scale)
     frame = shapely.box(0.0, 0.0, 1.0, 1.0)
     lines = shapely.union_all([*chords, frame.exterior], grid_size=GRID)
@@ -156,6 +157,7 @@ def window_of_regions(loop: MeasuredLoop, edge: Boundary) -> Window | None:
     near = np.all(scale[flags] < LARGEST * np.quantile(scale[flags], 0.9, axis=0), axis=1)
     flagged = curve[flags][near]
     walls = edge.segments[flagged].reshape(-1, 2)
+    # the crossing of both lines, the middle of its four sectors, is a corner of a cell if one of these is stable
     sectors = _walls_in_sectors(loop, 1e-3 * float(np.ptp(walls[:, 1])))
     if len(sectors) and np.any(edge.outside(sectors) == 0):
         walls = np.vstack([walls, np.mean(sectors, axis=0)])
@@ -165,7 +167,8 @@ def window_of_regions(loop: MeasuredLoop, edge: Boundary) -> Window | None:
 
 
 def _walls_in_sectors(loop: MeasuredLoop, beside: float) -> Floats:
-    """Four walls (4, 2), one in each sector that the lines of real roots cut round their crossing; or (0, 2).
+    """Four walls (4, 2), one in each sector that the lines of real roots cut round their crossing; (0, 2)
+    where they do not cross, or one is missing.
 
     beside  their distance from it, in damping
     """
@@ -214,7 +217,7 @@ def _window_around(wall: tuple[float, float], box: Window, of_K: float, of_B: fl
 
 
 def angles_at_wall(cells: StableRegions, wall: tuple[float, float]) -> list[float]:
-    """The angles of the branches that pass through a wall, ascending: one, or two at a corner."""
+    """The angles of the branches that pass through a wall, ascending: one, or two at a corner; none of nan."""
     if isnan(wall[0]):
         return []
     K0, K1, B0, B1 = cells.box
@@ -371,6 +374,7 @@ def certain_wall(edge: Boundary, doubt: Doubt, lines: Floats) -> CertainWall:
     for _ in range(ZOOMS):
         if np.all(np.isnan(values)):
             return CertainWall()
+        # more lines between the neighbours of the best one, which stays among them
         best = int(np.nanargmax(values))
         more = np.linspace(lines[max(best - 1, 0)], lines[min(best + 1, len(lines) - 1)], ZOOMED_LINES)
         lines, values = (
@@ -397,6 +401,7 @@ def largest_possible(edge: Boundary, doubt: Doubt, nominal: CertainWall, most_da
     stiffnesses = nominal.stiffness * (1.0 + EXCESSES)
     K, B = np.meshgrid(stiffnesses, lines, indexing="ij")
     may_be = _may_be_stable(edge, doubt, np.column_stack([K.ravel(), B.ravel()])).reshape(K.shape)
+    # stiffnesses at which some wall may be stable; then halving from the largest of these to the next one
     rows = np.flatnonzero(np.any(may_be, axis=1))
     if not len(rows):
         return nominal.stiffness
@@ -464,7 +469,8 @@ def _intervals_at_crossings(edge: Boundary, doubt: Doubt, B: float) -> Floats:
     at = np.flatnonzero((a[:, 1] > B) != (b[:, 1] > B))
     share = (B - a[at, 1]) / (b[at, 1] - a[at, 1])
     K = a[at, 0] + share * (b[at, 0] - a[at, 0])
-    number = edge.angle_index[at]  # of the curve from 0 on; -1 on the line of z = 1, -2 on that of z = -1
+    # of the curve from 0 on; -1 on the line of z = 1; -2 on that of z = -1, and -3 beyond the data: as at pi
+    number = edge.angle_index[at]
     theta = np.where(number >= 0, edge.angles[np.maximum(number, 0)], np.where(number == -1, 0.0, np.pi))
     near = np.clip(np.searchsorted(doubt.angles, theta), 0, len(doubt.angles) - 1)
     size = np.abs(K + B * doubt.velocity[near])

@@ -54,7 +54,8 @@ class RobustChart(CommonChart):
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
         """Verdicts on walls K, B (...) that broadcast, by eigenvalues of every member: stable for all of them,
-        unstable for one, else undecided; radius and frequency are those of the member with the largest radius.
+        unstable for one, else undecided. Radius, its uncertainty and the frequency are those of the member with
+        the largest radius; unheld positions are the most that any member has.
 
         Where nothing is known of a member no wall is known to be stable: it is undecided."""
         each = [judge(loop, wall_stiffness, wall_damping) for loop in self.members.values()]
@@ -113,7 +114,10 @@ def robust_chart(members: Sequence[Loop]) -> RobustChart:
 
 
 def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart:
-    """`robust_chart` for members that are charted already. Raises ChartError if there are none."""
+    """`robust_chart` for members that are charted already. Raises ChartError if there are none.
+
+    charted, failed  index -> the member; index -> why another one has no chart
+    """
     if not charted:
         reason = next(iter(failed.values()), "there is none")
         raise ChartError(f"no member could be charted; the first: {reason}")
@@ -123,6 +127,7 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
     arcs, blur = common_edge(shape, cutters, unit)
     tracers = {index: member.tracer for index, member in charted.items()}
     edge = TracedEdge(arcs, tracers)
+    # what chords do not see may be cut off
     if _has_small_cut(edge.arc_points, list(charted.values()), unit):
         blur = max(blur, CHORD)
     by_area, largest_area = _best_by_area(charted, shapes)
@@ -149,13 +154,14 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
 
 def _has_small_cut(samples: list[ArcPoints], members: list[Member], unit: float) -> bool:
     """Whether a member makes walls unstable just inside a piece of edge, tested at its quarters at a depth of 1e-9
-    of its length; such cuts are too small for the chords of the outlines."""
+    of its extent; such cuts are too small for the chords of the outlines."""
     for _, K, B in samples:
         walk = np.column_stack([K * unit, B])
         depth = 1e-9 * float(np.max(np.ptp(walk, axis=0)))
-        middles = walk if len(K) > 2 else np.vstack([walk[0], walk.mean(axis=0), walk[1]])
-        for k in {len(middles) // 4, len(middles) // 2, 3 * len(middles) // 4} - {0, len(middles) - 1}:
-            along, start = middles[k + 1] - middles[k - 1], middles[k]
+        # three points at least: the stable side of the walk is on the left of the way past each but the ends
+        points = walk if len(K) > 2 else np.vstack([walk[0], walk.mean(axis=0), walk[1]])
+        for k in {len(points) // 4, len(points) // 2, 3 * len(points) // 4} - {0, len(points) - 1}:
+            along, start = points[k + 1] - points[k - 1], points[k]
             inside = start + depth * np.array([-along[1], along[0]]) / max(np.hypot(*along), 1e-300)
             if any(member.unstable(float(inside[0] / unit), float(inside[1])) for member in members):
                 return True
@@ -170,6 +176,7 @@ def _stiffness(edge: TracedEdge) -> float:
 def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, float]:
     """Index of the member of the largest area within K, B >= 0, by polygons to 1e-6, and its exact area."""
     cells = [shapes[index] for index in charted]
+    # nan where all are empty
     right, top = np.nan_to_num(shapely.total_bounds(cells)[2:])
     areas = np.zeros(len(cells))
     if right > 0.0 and top > 0.0:
@@ -194,6 +201,7 @@ def walls_off_edge(edge: TracedEdge, members: Sequence[Member]) -> Floats:
     K, B = np.ascontiguousarray(walls.T)
     off = np.zeros(len(walls), dtype=bool)
     for member in members:
+        # of walls where another member binds only those that this one may find unstable are judged
         tracer, binds = member.tracer, binding == member.index
         if tracer.is_high_degree:
             suspect = tracer.flags_by_phase(walls, np.zeros(len(walls)), 0) <= 0

@@ -47,7 +47,7 @@ class _OutlineChords:
 
 def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) -> tuple[Arcs, float]:
     """The edge of a common set as pieces of the members' arcs, and the share of its size to which corners are
-    known: rounding, but more where two arcs all but coincide.
+    known: 0 for rounding, more where two arcs all but coincide.
 
     shape    [K unit, B], see `members.intersect_members`
     unit     seconds: K unit and B have one unit, in which distances between walls are taken
@@ -62,8 +62,9 @@ def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: fl
     for cell in shapely.get_parts(shape):
         cell = cell.normalize()  # exterior clockwise, holes counter-clockwise
         for line in (cell.exterior, *cell.interiors):
-            points = shapely.get_coordinates(line)[::-1]
+            points = shapely.get_coordinates(line)[::-1]  # with the set on the left
             runs = _runs_on_arcs(points, members, segments, SAME * size)
+            # without rounding of corners, unless the ring has two runs at most
             runs = _merge_runs([run for run in runs if len(runs) < 3 or run.length > SHORTEST * size])
             runs = _merge_runs(_runs_on_edge(runs, members, unit, INSIDE * size))
             ring, blurred = _arcs_between_corners(runs, unit, size)
@@ -87,11 +88,13 @@ def _outline_chords(members: Sequence[Member], unit: float) -> _OutlineChords:
 def _runs_on_arcs(
     points: Floats, members: Sequence[Member], segments: _OutlineChords, near: float
 ) -> list[ArcRun]:
-    """The walk round a polygon (k, 2) [K unit, B] in runs, each on one arc; the first begins an arc.
+    """The walk round a polygon (k, 2) [K unit, B] in runs, each on one arc; the first begins where the
+    arc changes, or at the first point if it never does.
 
     segments, near  as for `_nearest_segments`
     """
     nearest = _nearest_segments(points, segments, near)
+    # of each edge of the polygon: member and arc, and theta at both its ends
     origins = segments.origin[nearest]
     angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(nearest)])
     changes = np.any(origins != np.roll(origins, 1, axis=0), axis=1)
@@ -117,11 +120,13 @@ def _starts_anew(arc: Arc, before: float, after: float) -> bool:
 
 def _nearest_segments(points: Floats, segments: _OutlineChords, near: float) -> Ints:
     """For each edge of a walk the segment that it lies on: the first within `near` of both its ends that runs the
-    same way, and of several the one on the arc of the edge before.
+    same way, and of several the one on the arc of the edge before. Where there is none, one near its middle, or
+    the nearest of all.
 
     points  (k, 2) of the walk [K unit, B];   Returns  (k - 1,) numbers of segments
     """
     middles = 0.5 * (points[:-1] + points[1:])
+    # segments in the box round the walk
     inside = np.flatnonzero(
         np.all(segments.ends.max(axis=1) >= points.min(axis=0) - near, axis=1)
         & np.all(segments.ends.min(axis=1) <= points.max(axis=0) + near, axis=1)
@@ -130,11 +135,13 @@ def _nearest_segments(points: Floats, segments: _OutlineChords, near: float) -> 
     edge, hit = tree.query(shapely.points(middles), predicate="dwithin", distance=near)
     hit = inside[hit]
     along = segments.ends[hit, 1] - segments.ends[hit, 0]
+    # distances of an edge's first and last point
     ends = _distance(points[edge], segments.ends[hit]), _distance(points[edge + 1], segments.ends[hit])
     # two edges of a needle are near each other, but run opposite ways
     ahead = np.sum(along * (points[edge + 1] - points[edge]), axis=1) > 0.0
     apart = np.where(ahead, np.maximum(*ends), np.inf)
     out = np.full(len(middles), -1)
+    # the segments of each edge together, near ones first, then by number
     order = np.lexsort((hit, apart > near, edge))
     edge, hit, apart = edge[order], hit[order], apart[order]
     bounds = np.searchsorted(edge, np.arange(len(middles) + 1))
@@ -200,7 +207,7 @@ def _merge_runs(runs: list[ArcRun]) -> list[ArcRun]:
 
 def _arcs_between_corners(runs: list[ArcRun], unit: float, size: float) -> tuple[list[Arc], float]:
     """Runs as arcs between exact corners; and how far a corner that could not be solved for may be off."""
-    if len(runs) == 1:
+    if len(runs) == 1:  # a closed arc has no corner but its own
         return [runs[0].arc], 0.0
     corners = [solve_corner(run, runs[(k + 1) % len(runs)], unit, size) for k, run in enumerate(runs)]
     arcs = []
@@ -292,7 +299,8 @@ class Corner:
 def solve_corner(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner:
     """The corner where one run ends and the next begins; size: of the set [K unit, B].
 
-    Where it cannot be solved for, the polygons' corner, with a blur of 1e-6 of the size.
+    Between two successive arcs of one member it is that member's own. Where it cannot be solved for, the polygons'
+    corner, with a blur of 1e-6 of the size.
     """
     follows = one.member is two.member and two.arc_number == one.member.edge.arcs.next_arc[one.arc_number]
     if follows and np.hypot(*(one.last - np.multiply(one.arc.last, (unit, 1.0)))) <= 1e-6 * size:
@@ -305,7 +313,8 @@ def solve_corner(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner:
 
 
 def _solve_crossing(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner | None:
-    """Newton for the crossing of two arcs, from where the polygons have it; None if it wanders off.
+    """Newton for the crossing of two arcs, from where the polygons have it; None if it wanders off, or
+    leaves the arcs apart by more than BLURRED.
 
     size  of the set [K unit, B]
     """
@@ -330,6 +339,7 @@ def _solve_crossing(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corne
     if np.hypot(*(at - one.last)) > REACH * size:
         return None
     K, B = at / (unit, 1.0)
+    # a straight arc has one angle all along
     angles = (
         u if one.arc.curved else one.arc.start,
         v if two.arc.curved else two.arc.start,

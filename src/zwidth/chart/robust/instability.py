@@ -115,7 +115,8 @@ def softening(polynomials: Floats, K: float, B: float) -> float:
     """By how much [N/m] an unstable wall must be softened at its damping until it is stable; K itself if no
     softer wall is.
 
-    The next stable stiffness below is looked for in steps that grow by a quarter from 1e-8 of K, then bisected.
+    The next stable stiffness below is looked for at shares of K to soften it by, from 1e-8 on each a quarter
+    larger than the one before, then bisected.
     """
     N = polynomials.shape[1] - 1
     return _softening(polynomials, N, K, B, work_array(N))

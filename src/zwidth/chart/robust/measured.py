@@ -72,7 +72,7 @@ class MeasuredRobustChart(CommonChart):
 def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[int, str]) -> MeasuredRobustChart:
     """The walls that all measured charts have for certain.
 
-    members  index -> chart, at least one whose edge closes (see `open_edge`)
+    members  index -> chart, at least one; the edge of each closes (see `open_edge`)
     failed   index -> why a member has no chart
     """
     unit = max(chart.loop.period for chart in members.values())
@@ -88,6 +88,7 @@ def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[
     by_area = max(areas, key=lambda index: (areas[index], -index))
     by_stiffness = max(alone, key=lambda index: (np.nan_to_num(alone[index][0]), -index))
     area = float(common_quadrant.area) / unit
+    # members that have no wall with K, B >= 0 by themselves
     without = [index for index, quadrant in quadrants.items() if quadrant.is_empty]
     return MeasuredRobustChart(
         drawn_regions=_rings(common, unit),
@@ -201,6 +202,7 @@ def _stiffest_common(
     least = min(alone, key=lambda index: (alone[index][0], index))
     chart = members[least]
     certain = chart.stiffness_max if chart.band is None else chart.band.stiffness_low
+    # both are nan where that chart has no certain wall
     if certain == chart.stiffness_max and abs(K - certain) <= 10.0 * CHORD * certain:
         wall = certain, chart.damping_at_stiffness_max
         others = [other for index, other in members.items() if index != least]
@@ -252,7 +254,7 @@ def _arcs_of_members(
     common: shapely.MultiPolygon,
     unit: float,
 ) -> list[BoundaryArc]:
-    """The common set's outlines in pieces of one binding member each, with frequencies of its nearest edge."""
+    """The common set's outlines in pieces of one binding member each, with frequencies by that member's check."""
     arcs = []
     if common.is_empty:
         return []
@@ -265,6 +267,7 @@ def _arcs_of_members(
             away = _distances(shapes, 0.5 * (walk[1:] + walk[:-1]), size)[order]
             near = away <= np.maximum(away.min(axis=0), ON_EDGE)
             owner = np.array(order)[np.argmax(near, axis=0)]
+            # the ring is turned to begin where the owner changes, so that no run goes on across its start
             start = int(np.argmax(owner != owner[-1])) if np.any(owner != owner[-1]) else 0
             owner, walk = np.roll(owner, -start), np.vstack([np.roll(walk[:-1], -start, axis=0), walk[start]])
             for run in np.split(np.arange(len(owner)), np.flatnonzero(np.diff(owner)) + 1):

@@ -68,7 +68,7 @@ def chart_member(index: int, loop: Loop) -> Member:
 def member_polygons(member: Member, unit: float) -> shapely.MultiPolygon:
     """A loop's stable set as one geometry in [K unit, B], clockwise outlines as holes.
 
-    unit  seconds: K T and B have one unit, in which distances between walls are taken
+    unit  seconds: K unit and B have one unit, in which distances between walls are taken
     """
     scaled = [outline * (unit, 1.0) for outline in member.edge.outlines]
     solid = [outline for outline in scaled if signed_area(outline) > 0.0]

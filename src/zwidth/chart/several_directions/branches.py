@@ -95,7 +95,10 @@ class _Fold(NamedTuple):
 def trace_branches(
     equation: RootEquation, samples: BranchSamples, box: WallBox
 ) -> tuple[BranchSamples, list[CurvePoints]]:
-    """The samples that this took, and the branches within a box. A closed branch ends where it begins."""
+    """The samples that this took, and the branches in and around a box. A closed branch ends where it begins.
+
+    Steps in which a wall near the box lacks a continuation are halved; where none is found a branch ends.
+    """
     for _ in range(ROUNDS):
         forward, folds, unclear = _link(equation, samples, box)
         u = samples.parameters
@@ -117,6 +120,7 @@ def _link(equation: RootEquation, samples: BranchSamples, box: WallBox) -> tuple
     ahead, behind = near.copy(), near.copy()
     ahead[-1], behind[0] = False, False
     ahead[:-1] &= forward < 0
+    # a wall is continued from behind where one before leads to it
     n, k = np.nonzero(forward >= 0)
     behind[n + 1, forward[n, k]] = False
     folds = [*_folds(equation, samples, box, ahead, 1), *_folds(equation, samples, box, behind, -1)]
@@ -133,6 +137,7 @@ def _continuations(samples: BranchSamples, box: WallBox) -> Ints:
     # (N - 1, q, q) how far each next wall is from where the mean of its slope and this wall's leads to
     miss = np.abs(chord - 0.5 * step * (slopes[1:, None, :] + slopes[:-1, :, None])).max(axis=-1)
     miss = np.where(np.isfinite(miss), miss, np.inf)
+    # the next wall that is missed least, by how much, and the length of the chord to it
     best = miss.argmin(axis=2)[..., None]
     own = np.take_along_axis(miss, best, axis=2)
     length = np.take_along_axis(np.abs(chord).max(axis=-1), best, axis=2)
@@ -144,13 +149,14 @@ def _continuations(samples: BranchSamples, box: WallBox) -> Ints:
     rival = np.minimum(rivals.min(axis=2, keepdims=True), np.take_along_axis(others, best, axis=2))
     mutual = np.take_along_axis(miss.argmin(axis=1), best[..., 0], axis=1) == np.arange(q)
     best, own, rival, length = (array[..., 0] for array in (best, own, rival, length))
-    first = np.isfinite(own) & mutual & (own <= UNRIVALLED * rival)
-    n, k = np.nonzero(first & (own <= CLEAR * length))
-    forwards = np.zeros_like(first)
+    # each is the other's best, far ahead of its rivals
+    unrivalled = np.isfinite(own) & mutual & (own <= UNRIVALLED * rival)
+    n, k = np.nonzero(unrivalled & (own <= CLEAR * length))
+    forwards = np.zeros_like(unrivalled)
     # both slopes lead there: those of two walls that turn back miss nothing in their mean
     step = chord[n, k, best[n, k]]
     forwards[n, k] = (_cosine(slopes[n, k], step) > CLEAR) & (_cosine(slopes[n + 1, best[n, k]], step) > CLEAR)
-    return np.where(forwards | (first & (length <= SAME)), best, -1)
+    return np.where(forwards | (unrivalled & (length <= SAME)), best, -1)
 
 
 def _folds(equation: RootEquation, samples: BranchSamples, box: WallBox, open_: Flags, way: int) -> list[_Fold]:
@@ -169,6 +175,7 @@ def _folds(equation: RootEquation, samples: BranchSamples, box: WallBox, open_: 
     n, a, b, chord = n[towards], a[towards], b[towards], chord[towards]
     if not len(n):
         return []
+    # points halfway along the chords are corrected across these, at whatever parameter
     scale = np.array([1.0, *box.size])
     middles = np.column_stack([u[n], 0.5 * (x[n, a] + x[n, b])])
     normals = np.column_stack([np.zeros(len(n)), chord / box.size])
@@ -181,7 +188,7 @@ def _folds(equation: RootEquation, samples: BranchSamples, box: WallBox, open_: 
     good = np.flatnonzero(settled & straight & within & (off < NEAR_CHORD * length))
     folds: list[_Fold] = []
     taken: set[tuple[int, int]] = set()
-    for k in good[np.argsort(length[good])]:
+    for k in good[np.argsort(length[good])]:  # the closest walls first, each wall once
         ends = {(int(n[k]), int(a[k])), (int(n[k]), int(b[k]))}
         if not ends & taken:
             taken |= ends
@@ -211,6 +218,7 @@ def _joined_branches(samples: BranchSamples, forward: Ints, folds: list[_Fold]) 
         join(int(n) * q + int(a), (int(n) + 1) * q + int(forward[n, a]))
     for fold in folds:
         join(fold.n * q + fold.one, fold.n * q + fold.other, fold)
+    # walks from ends first; what is left then are closed branches
     left, branches = set(ways), []
     for start in [*(wall for wall, beside in ways.items() if len(beside) == 1), *ways]:
         if start not in left:

@@ -55,7 +55,7 @@ class _Cells:
 
     curves    all that cuts the plane, with its samples
     inside    the curves as they run in the box: they cut out the cells
-    box       that fits them
+    box       in which they were drawn, and which fits them to MOVED but after MOST_LOOKS
     raster    walls tried on them
     """
 
@@ -229,13 +229,15 @@ def _stable_cells(loop: MultiLoop, curves: CurveSet) -> _Cells:
     """The stable cells that curves cut out.
 
     The curves are drawn in boxes that come to fit the cells, with samples added where walls tried show that a
-    piece of a curve was missed.
+    piece of a curve was missed. Where no edge is known walls of all orders of magnitude are tried: if none of them
+    is stable, there are no cells.
     """
     box = box_of_edges(loop, curves.samples, curves.lines)
     if box is None:
         raster = try_orders(loop, curves.samples)
         if not raster.differs.any():
             return _Cells(curves, [], [], WallBox(-np.ones(2), np.ones(2)), raster)
+        # no box is known yet: distances between walls are taken in units of k T and b
         curves = curves.with_angles(missed_angles(loop, raster, [], WallBox(np.zeros(2), np.ones(2))))
         far = ROOM * np.abs(raster.walls[raster.differs]).max(axis=0)
         box = box_of_edges(loop, curves.samples, curves.lines) or WallBox(-far, far)
@@ -245,6 +247,7 @@ def _stable_cells(loop: MultiLoop, curves: CurveSet) -> _Cells:
         polygons = stable_polygons(loop, cut_lines(inside, box))
         raster = try_walls(loop, polygons, box)
         cells, fitting = _Cells(curves, inside, polygons, box, raster), _fitting_box(polygons, box)
+        # which sides of the box are off by more than MOVED of its size
         moved = np.abs(np.concatenate([fitting.low - box.low, fitting.high - box.high])) > np.tile(
             MOVED * box.size, 2
         )

@@ -49,7 +49,7 @@ AT_ANGLE: Final = 1e-6
 
 
 def shows_all_walls(equations: Sequence[WallEquation]) -> bool:
-    """Whether each equation is of one direction, or of one law for all its directions."""
+    """Whether each equation is of one direction, or of one law, with stiffness and damping, for all of them."""
     return all(len(one.stiffness) == 1 or (_is_one_law(one) and _moves_both(one)) for one in equations)
 
 
@@ -60,10 +60,11 @@ def walls_beside_regions(
     polygons: Sequence[shapely.Polygon],
     box: WallBox,
 ) -> Floats:
-    """Walls (k, 2) of [K T, B] on the edge of the stable set that lie on no edge of its polygons.
+    """Walls (k, 2) of [K T, B] on the edge of the stable set that lie on no edge of the polygons found.
 
     equations  for which `shows_all_walls` holds
-    thetas     (n,) angles in (0, pi)
+    thetas     (n,) angles in (0, pi); if there are many, an even choice of them is looked at
+    box        whose size is the unit of distances from an edge
     """
     thetas = thetas[:: max(1, len(thetas) // MOST_ANGLES)]
     pieces = [_walls_with_pairs(one, thetas) for one in equations if _moves_both(one)]
@@ -84,12 +85,13 @@ def _is_one_law(equation: WallEquation) -> bool:
 
 def _moves_both(equation: WallEquation) -> bool:
     """Whether K and B both move the roots of an equation; of one alone `curve_set` finds the lines."""
+    # of one direction, or one law for all: the first tells
     return bool(equation.stiffness[0] > 0.0 and equation.damping[0] > 0.0)
 
 
 @np.errstate(all="ignore")  # walls at infinity are data
 def _walls_with_pairs(equation: WallEquation, thetas: Floats) -> Floats:
-    """All walls with a pair of roots at these angles (n,), as rows (k, 3) of [theta, K T, B]."""
+    """All walls with a pair of roots at angles (n,), under one law, as rows (k, 3) of [theta, K T, B]."""
     # k s + b v w = h, as at the file's head; under one law B of `terms` is s Y
     s, v = equation.stiffness[0], equation.damping[0]
     forces, stiffened, _ = equation.terms(thetas)
@@ -97,6 +99,7 @@ def _walls_with_pairs(equation: WallEquation, thetas: Floats) -> Floats:
     thetas, forces, readings = thetas[known], forces[known], stiffened[known] / s
     numbers = _singular_numbers(forces, readings)
     w = equation.loop.velocity_response(np.exp(1j * thetas))[:, None]
+    # b v and k s, from both parts of h
     damping = numbers.imag / w.imag
     stiffness = numbers.real - damping * w.real
     rows = np.stack(np.broadcast_arrays(thetas[:, None], stiffness / s * equation.loop.period, damping / v), -1)
@@ -124,7 +127,7 @@ def _on_edge(loop: MultiLoop, thetas: Floats, walls: Floats) -> Flags:
         z = np.linalg.eigvals(loop.transition_matrix(K, B))
         away = np.abs(z - np.exp(1j * thetas[part])[:, None]).min(axis=-1)
         found[part] = (np.abs(z).max(axis=-1) < 1.0 + ON_CIRCLE) & (away < AT_ANGLE)
-    # A slow motion may be outside by less than that all along a curve: it is, where rounding is still less.
+    # A slow motion may be outside by less than ON_CIRCLE all along a curve: judged again, to rounding.
     at = np.flatnonzero(found)
     K, B = (walls[at] / (loop.period, 1.0)).T
     found[at] = distances_from_circle(loop, K, B, band=WALL_ROUNDING) <= 0.0
@@ -143,7 +146,8 @@ PARALLEL = 1e-9
 
 
 def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]) -> WallBox | None:
-    """A box about the origin that holds the stable set, in [K T, B]; None where no sample lies on its edge.
+    """A box about the origin that holds the stable set, in [K T, B]; None where no sample and no crossing
+    of lines lies on its edge, or [0, 0] alone.
 
     Samples of the edge (no root outside the circle) and crossings of lines show where it is. A box much larger
     than that would leave it to rounding, one much smaller might miss another cell.
@@ -228,6 +232,7 @@ class Raster:
 def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: WallBox) -> Raster:
     """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and beside their edges."""
     cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS]
+    # a single cell fills the box, whose own grid is enough
     bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
     grids = [_grid(low, high, CELL_SIDE) for low, high in bounds]
     walls = np.vstack([_grid(box.low, box.high, SIDE), *grids, *(_walls_beside(cell, box) for cell in cells)])
@@ -263,6 +268,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
     """Angles at which roots cross the circle, on no known edge, on the way from walls that differ; and around."""
     first = np.flatnonzero(raster.differs)
     first = first[:: max(1, len(first) // FROM)]
+    # each of these walls with the nearest ones of the other verdict
     pairs = []
     for k in first:
         other = np.flatnonzero(raster.stable != raster.stable[k])
@@ -272,6 +278,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
         return np.empty(0)
     a, b = (raster.walls[np.array(column)] for column in zip(*pairs, strict=True))
     at_a = raster.stable[[k for k, _ in pairs]]
+    # both close in on a crossing, a from the side of the wall that differs
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
         same = (_raster_radii(loop, middle) < 1.0) == at_a
@@ -284,6 +291,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
     )
     K, B = (b[new] / (loop.period, 1.0)).T
     z = np.linalg.eigvals(loop.transition_matrix(K, B))
+    # the root nearest to the circle is the one that crosses
     nearest = np.take_along_axis(z, np.abs(np.abs(z) - 1.0).argmin(axis=-1)[:, None], axis=-1)
     thetas = np.abs(np.angle(nearest))
     return np.unique(thetas * (1.0 + BESIDE))

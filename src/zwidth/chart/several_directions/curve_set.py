@@ -90,7 +90,7 @@ class RealRootEquation:
     period: float
 
     def solutions(self, parameters: Floats) -> Floats:
-        """All walls (N, r, 2) for s (N,) [N/m]."""
+        """All walls (N, r, 2) of [k T, b] for s (N,) [N/m]; nan for solutions that are not real."""
         s, T, w = parameters[:, None], self.period, self.estimate
         t = self._eigenvalues(parameters)
         for _ in range(POLISH):
@@ -128,8 +128,8 @@ class RealRootEquation:
         return determinant(W)[:, None] / size, slopes / size
 
     def _eigenvalues(self, parameters: Floats) -> Floats:
-        """t = (k + b w)/2 (N, r) for s (N,), to the digits of an eigenvalue solver; nan for those that are not
-        real."""
+        """t = (k + b w)/2 (N, r) for s (N,), ascending, to the digits of an eigenvalue solver; nan, last, for
+        those that are not real."""
         # W Y^-1 = F Y^-1 + s (D - E) + t (D + E), divided by the root of D + E on both sides: -t are eigenvalues
         root = np.sqrt(self.stiffness + self.damping)
         H = self.forces @ np.linalg.inv(self.readings) / np.outer(root, root)
@@ -147,11 +147,12 @@ def real_root_walls(equation: WallEquation) -> tuple[list[StraightLine], list[Re
     lines: list[StraightLine] = []
     curves: list[RealRootEquation] = []
     s, v, T = equation.stiffness, equation.damping, equation.loop.period
+    # size of the plant's stiffness at a quarter of the sampling rate, which tells rounding from 0
     scale = float(np.abs(equation.terms(np.array([np.pi / 2.0]))[0]).max())
     for z, angle in ((1.0, 0.0), (-1.0, np.pi)):
         F, Y = equation.real_columns(z)
         w = float(equation.loop.estimator.response(z)[0].real)
-        if not np.isfinite(F).all():
+        if not np.isfinite(F).all():  # some force moves nothing that is read
             continue
         if abs(w) * T <= ROUNDING:
             lines += _lines_of_stiffness(equation, F, Y, z, scale)
@@ -182,6 +183,7 @@ def _lines_of_stiffness(
     inverse = equation.inverse(z)
     if z > 0.0 and inverse is not None and (s == 0.0).any():
         H, dH = inverse
+        # motions that the law can only damp, and the others
         free, rest = _free_at_rest(H, s == 0.0, UNSPRUNG * scale)
         dw = float(equation.loop.estimator.response(z)[1].real)
         damped = _singular_numbers(free.T @ dH @ free, dw * (free.T * v) @ free, scale / dw)
@@ -205,10 +207,11 @@ def _free_at_rest(H: Floats, unsprung: Flags, least: float) -> tuple[Floats, Flo
 
 
 def _singular_numbers(A: Floats, B: Floats, scale: float) -> list[float]:
-    """All real x with det(A + x B) = 0, A, B (r, r); scale: size of a large x, which tells rounding from 0."""
+    """All real x with det(A + x B) = 0, A, B (r, r); 0 for those below ZERO of `scale`, the size of a large x."""
     if not len(A):
         return []
     alpha, beta = scipy.linalg.eig(A, -B, right=False, homogeneous_eigvals=True)
+    # beta = 0: x at infinity
     finite = np.abs(beta) > 1e-12 * np.abs(beta).max(initial=0.0)
     x = _real_or_nan(alpha[finite] / beta[finite], ZERO * scale)
     x = x[np.isfinite(x)]
@@ -237,7 +240,10 @@ STEPS: Final = 48
 class CurveSet:
     """What cuts the plane of walls: equations with the samples at which all their walls are known, and lines.
 
-    equations  of all sets of coupled directions; those that both numbers move are the ones of `pairs`
+    equations  of all sets of coupled directions; those whose roots both k and b move are the ones of `pairs`
+    pairs      each of these with all its walls at the angles sampled so far
+    real       equations of curves of walls with a real root
+    lines      of walls with a real root, and with a pair where the law has one number only
     """
 
     loop: MultiLoop
@@ -258,7 +264,7 @@ class CurveSet:
         return every[np.isfinite(every).all(axis=1)]
 
     def with_angles(self, thetas: Floats) -> CurveSet:
-        """These curves with more samples, at angles thetas (n,) in (0, pi)."""
+        """These curves with more samples, at those of the angles thetas (n,) that lie between their outermost."""
         pairs = []
         for equation, samples in self.pairs:
             known = samples.parameters
@@ -268,7 +274,7 @@ class CurveSet:
         return replace(self, pairs=tuple(pairs))
 
     def within(self, box: WallBox, tolerance: float) -> tuple[CurveSet, list[WallCurve]]:
-        """These curves with all samples that this took, and the curves and lines as they run through a box.
+        """These curves with all samples of pairs that this took, and all curves and lines as they run in a box.
 
         tolerance  largest distance of a chord from its curve, in shares of the box
         """
@@ -285,13 +291,14 @@ class CurveSet:
             first = BranchSamples.of(real, _steps_across(real, box))
             _, branches = followed_branches(real, first, box, scale, tolerance)
             curves += [TracedCurve(real, traced, scale, real.period) for traced in branches]
+        # from the foot of a line that meets the box past all of the box
         reach = float(np.hypot(*box.size) + 2.0 * np.hypot(*np.abs([box.low, box.high]).max(axis=0)))
         lines = [replace(line, size=reach) for line in self.lines]
         return replace(self, pairs=tuple(pairs)), [*curves, *lines]
 
 
 def trace_curves(loop: MultiLoop) -> CurveSet:
-    """The curves of a loop, sampled where its poles and zeros say that they turn."""
+    """The curves of a loop, those of pairs sampled where its poles and zeros say that they turn."""
     thetas = first_angles(loop)
     pairs: list[tuple[WallEquation, BranchSamples]] = []
     real: list[RealRootEquation] = []
@@ -300,7 +307,7 @@ def trace_curves(loop: MultiLoop) -> CurveSet:
     for equation in equations:
         if (equation.stiffness > 0.0).any() and (equation.damping > 0.0).any():
             pairs.append((equation, BranchSamples.of(equation, thetas)))
-        else:
+        else:  # one number alone moves the roots
             lines += pair_lines(equation, thetas)
         own_lines, own_real = real_root_walls(equation)
         lines += own_lines
@@ -357,7 +364,7 @@ def followed_branches(
 def _branch_with_chords(
     equation: RootEquation, branch: CurvePoints, box: WallBox, scale: Floats, tolerance: float
 ) -> tuple[CurvePoints, Floats]:
-    """A branch with more points, and parameters at which to sample where none fit.
+    """A branch with points added halfway along chords, and parameters (n,) at which to sample where none fit.
 
     scale, tolerance  as for `followed_branches`
     """
@@ -373,6 +380,7 @@ def _branch_with_chords(
         chord = points[k + 1] - points[k]
         guess = traced.guess(k, np.full(len(k), 0.5), scale)
         middles, along, settled = correct_point(equation, guess, chord / scale**2, scale)
+        # turned forwards along the chord
         along *= np.where(np.einsum("ni,ni->n", along, chord / scale) < 0.0, -1.0, 1.0)[:, None] * scale
         fits = settled & _can_lie_halfway(points[k], chord, middles, scale)
         unfit.append(_steps_between(points[k[~fits]], points[k[~fits] + 1]))
@@ -380,12 +388,14 @@ def _branch_with_chords(
         bent = off[:, 0] > BENT * np.abs(chord[:, 0]) + POINT_ROUNDING * np.abs(middles[:, 0])
         finer = (bent | _turn_much(traced, k, box)) & (np.abs(chord[:, 1:] / box.size) > SMALLEST).any(axis=1)
         more = fits & ((off[:, 1:] / box.size > tolerance).any(axis=1) | finer)
+        # places along the branch, by which old and new points are put in order
         at = np.concatenate([np.arange(len(points)), k[more] + 0.5])
         order = np.argsort(at)
         traced = CurvePoints(
             np.vstack([points, middles[more]])[order], np.vstack([directions, along[more]])[order]
         )
         new = np.flatnonzero(order >= len(points))
+        # next time only the two halves of each chord that was halved
         loose = np.zeros(len(at) - 1, dtype=bool)
         loose[new], loose[new - 1] = True, True
     return traced, np.concatenate(unfit)
@@ -439,6 +449,7 @@ def with_limits(curve: TracedCurve, samples: BranchSamples) -> TracedCurve:
         limit = None if end is None else _point_of_limit(curve, k, end)
         if limit is not None:
             points, directions = [limit, traced.points], [np.zeros((1, 3)), traced.directions]
+            # the limit goes before the first point, or after the last; its direction is not known, 0
             order = slice(None, None, 1 if k == 0 else -1)
             traced = CurvePoints(np.vstack(points[order]), np.vstack(directions[order]))
         limits.append(limit is not None)
@@ -458,12 +469,14 @@ def _point_of_limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
         guess = np.empty((len(ANGLES), 3))
         guess[:, 0] = end + away * ANGLES
         guess[:, 1:] = point[1:] + parabola * (ANGLES[:, None] ** 2 - 1.0)
+        # normals of planes of one angle each
         upright = np.tile([1.0, 0.0, 0.0], (len(ANGLES), 1))
         near, _, settled = correct_point(curve.equation, guess, upright, curve.scale)
     near[~settled] = np.nan
     windows = np.lib.stride_tricks.sliding_window_view(near[:, 1:], 4, axis=0)
     by_four = windows @ FOUR
     apart = np.abs((by_four - windows[..., :3] @ THREE) / curve.scale[1:]).max(axis=1)
+    # the window where three and four angles agree best, if that is not far from the parabola
     walls = by_four[np.nanargmin(apart)] if np.isfinite(apart).any() else point[1:] - parabola
     if np.abs((walls - point[1:] + parabola) / curve.scale[1:]).max() > NEAR_PARABOLA:
         walls = point[1:] - parabola
@@ -486,6 +499,7 @@ def pair_lines(equation: WallEquation, thetas: Floats) -> list[StraightLine]:
         apart = np.abs(numbers[n][:, None] - numbers[n + 1]) / (
             np.abs(numbers[n][:, None]) + np.abs(numbers[n + 1])
         )
+        # each number goes on in one at the next angle, so that all together move least
         for i, j in zip(*linear_sum_assignment(apart), strict=True):
             ends = numbers[n, i], numbers[n + 1, j]
             if ends[0].imag * ends[1].imag < 0.0:
@@ -503,9 +517,8 @@ def _numbers_with_root(equation: WallEquation, thetas: Floats) -> Complexes:
 
 
 def _real_number(equation: WallEquation, thetas: Floats, ends: tuple[complex, complex]) -> tuple[float, complex]:
-    """Angle between `thetas` (2,) at which one of `_numbers_with_root` is real, and that number.
-
-    ends  its values at both angles
+    """Angle between `thetas` (2,) where the imaginary part of one of `_numbers_with_root` changes sign, and that
+    number there: real but for rounding, or large at a pole. ends: the number at both angles.
     """
     low, high = (float(theta) for theta in thetas)
 
@@ -552,7 +565,7 @@ def _least_coupled_directions(P: Complexes, stiffness: Floats, damping: Floats) 
     """Directions (r, r), orthonormal, each in the place of one under the same law, that are coupled least.
 
     Where turning a set of directions of one law uncouples them at all angles, their axes are the eigenvectors of
-    any mean of the responses there.
+    any mean of the responses there. A set that is no less coupled when it is turned stays as it is.
 
     P                   (n, r, r)  responses at n angles
     stiffness, damping  (r,)       of the law along each direction
@@ -581,5 +594,6 @@ def _coupled_sets(P: Complexes) -> list[Ints]:
     # a direction leads to another over at most r others: powers of the matrix of couplings
     coupled = (np.abs(P) > UNCOUPLED * own[:, :, None] * own[:, None, :]).any(axis=0)
     reached = np.linalg.matrix_power(coupled.astype(float) + np.eye(r), r) > 0.0
+    # of each direction the set that it is in; each set is returned once, for its first direction
     sets = [np.flatnonzero(reached[k] & reached[:, k]) for k in range(r)]
     return [part for k, part in enumerate(sets) if part[0] == k]

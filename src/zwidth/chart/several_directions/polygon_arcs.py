@@ -53,7 +53,8 @@ class _CurveRun:
 
 
 def ring_arcs(curves: Sequence[WallCurve], ring: Floats, period: float) -> list[Arc]:
-    """A closed ring (k, 2) of walls [K T, B] as arcs in its order.
+    """A closed ring (k, 2) of walls [K T, B] as arcs in its order, each with the number of its curve as `member`
+    and, unless it is straight, parameters of that curve as angles.
 
     period  T [s]
     """
@@ -78,6 +79,7 @@ def _runs_of_sides(curves: Sequence[WallCurve], ring: Floats) -> list[_CurveRun]
     sides = np.diff(ring, axis=0)
     length = np.hypot(sides[:, 0], sides[:, 1])
     steps = _steps_near_ring(curves, ring)
+    # the step on which each side lies, by its middle, and between which sides a run ends
     tree = shapely.STRtree(shapely.linestrings(np.stack([steps.first, steps.last], axis=1)))
     nearest = tree.nearest(shapely.points(0.5 * (ring[1:] + ring[:-1])))
     curve, sample = steps.curve[nearest], steps.sample[nearest]
@@ -92,7 +94,7 @@ def _runs_of_sides(curves: Sequence[WallCurve], ring: Floats) -> list[_CurveRun]
 
 
 def _long_runs(runs: list[_CurveRun], shortest: float) -> list[_CurveRun]:
-    """Runs longer than `shortest`; those with only shorter ones between are joined, also across its start."""
+    """Runs longer than `shortest`, each joined to the one before if it continues that, also at the start."""
     long_runs: list[_CurveRun] = []
     for run in (run for run in runs if run.length > shortest):
         long_runs = (
@@ -155,7 +157,7 @@ def _corner(
 ) -> tuple[Wall, float, float]:
     """The wall [K T, B] where run `one` ends and run `other` begins, and the parameters of both curves there.
 
-    size  of the ring
+    size  of the ring; where no wall is found within STRAY of it, the ring's own corner is returned
     """
     a, b = curves[one.curve], curves[other.curve]
     solution: tuple[Floats, float, float] | None = None
@@ -200,7 +202,7 @@ def _common_wall(
     a: WallCurve, b: WallCurve, start_a: float, start_b: float, size: float
 ) -> tuple[Floats, float, float] | None:
     """Newton for the wall [K T, B] that two curves, or two places of one, share, and its parameters on a and on b;
-    None if it wanders off.
+    None if it wanders off, or both parameters of one curve begin at one place.
 
     start_a, start_b  parameters near it;   size  of the ring
 
@@ -208,6 +210,7 @@ def _common_wall(
     must vanish there is g = (p(s) - p(t)) / (s - t), with the slopes (p'(s) - g) / (s - t) by s and
     (g - p'(t)) / (s - t) by t.
     """
+    # of the step before: its length, where its tangents meet, and how far apart the walls were
     s, t, last = start_a, start_b, np.inf
     meant, apart = np.zeros(2), np.inf
     if a is b and abs(s - t) <= ONE_PLACE * abs(s):
@@ -231,7 +234,7 @@ def _common_wall(
         if moved <= SETTLED * size or (moved > 0.5 * last and moved < NEARLY * size):
             break
         last = moved
-    if a is b and (s - t) * (start_a - start_b) < 0.0:
+    if a is b and (s - t) * (start_a - start_b) < 0.0:  # the two places of one curve have passed each other
         s, t = t, s
     return 0.5 * (_wall_with_slope(a, s)[0] + _wall_with_slope(b, t)[0]), s, t
 
@@ -271,16 +274,17 @@ class Branch:
 
     def dense_points(self, arc: Arc) -> ArcPoints:
         """Angles strictly between an arc's ends, from first to last, with K and B: chords within
-        BRANCH_CHORD of the size."""
+        BRANCH_CHORD of the size, but no more than MOST_PIECES from sample to sample."""
         places = arc.angles
         middles = 0.5 * (places[1:] + places[:-1])
         K, B, *_ = self.curve.at(np.concatenate([arc.thetas, middles]))
+        # walls at the arc's samples, then at the middles
         inner = np.column_stack([K, B])
         walls = np.vstack([arc.first, inner[: len(arc.thetas)], arc.last])
         off = inner[len(arc.thetas) :] - 0.5 * (walls[1:] + walls[:-1])
         sag = np.max(np.abs(off) / self.size, axis=1)
         inside = self.curve.regular(places)
-        sag[~(inside[1:] & inside[:-1])] = 0.0
+        sag[~(inside[1:] & inside[:-1])] = 0.0  # straight pieces at limits
         pieces = np.clip(np.ceil(np.sqrt(sag / BRANCH_CHORD)), 1, MOST_PIECES).astype(int)
         steps = [
             np.linspace(a, b, n, endpoint=False) for a, b, n in zip(places[:-1], places[1:], pieces, strict=True)
@@ -289,10 +293,11 @@ class Branch:
         return angles, K, B
 
     def integral(self, arc: Arc) -> float:
-        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N² s/m²], by Gauss's rule."""
+        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N² s/m²]: by Gauss's rule, and of
+        the straight pieces at the curve's limits."""
         inside = self.curve.regular(arc.angles)
         inner = arc.angles[inside]
-        if len(inner) < 2:
+        if len(inner) < 2:  # nothing but such pieces
             return _straight_integral(arc.first, arc.last)
         stops = np.unique(np.concatenate([inner, self.zeros(arc, STIFFNESS), self.zeros(arc, DAMPING)]))
         stops = stops if inner[0] < inner[-1] else stops[::-1]

@@ -58,7 +58,7 @@ class CurvePoints(NamedTuple):
 
     @classmethod
     def of(cls, walk: Sequence[tuple[Floats, Floats]]) -> CurvePoints:
-        """Points in order, each with a direction of either sign: they are turned to point forwards."""
+        """Points (3,) in order, each with a direction (3,) of either sign, which stays (`forwards` turns it)."""
         points, directions = (np.array(column) for column in zip(*walk, strict=True))
         return cls(points, directions)
 
@@ -76,7 +76,8 @@ class CurvePoints(NamedTuple):
     def guess(self, j: Ints, share: Floats, scale: Floats) -> Floats:
         """Points (k, 3) at shares (k,) of the way from points j to j + 1, by the cubic with their directions.
 
-        Where that bulges so far that the parameter leaves its interval by more than its length, it ends there.
+        A direction that is unknown, or hardly along the chord, bends nothing. Where the cubic bulges so far that
+        the parameter leaves its interval by more than its length, the parameter ends there.
         """
         chord = (self.points[j + 1] - self.points[j]) / scale
         length = np.linalg.norm(chord, axis=1)[:, None]
@@ -101,8 +102,9 @@ def correct_point(
 
     scale    (3,) size of u, k T and b
     Returns  the points (n, 3), unit tangents there (n, 3) of either sign in units of scale, and which have settled
+             (n,); one that a step would lead too far stays where it was, its tangent 0 before the first step
     """
-    # moved: numbers of the points that have not settled
+    # moved: numbers of the points that are still on their way
     out, along, moved = points.copy(), np.zeros_like(points), np.arange(len(points))
     settled, last = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
     for _ in range(CORRECTIONS):
@@ -151,8 +153,8 @@ class TracedCurve:
     traced    its points, and its directions there
     scale     (3,)   size of u, k T and b, in which chords are taken
     period    T [s]
-    limits    whether the first and the last point are where two roots meet at z = 1 or -1: the curve is straight
-              from there to the next point
+    limits    whether the first and the last point are where two roots meet at z = 1 or -1: between there and the
+              next point no place is corrected, and the slope is the chord's
     """
 
     equation: RootEquation
@@ -207,7 +209,8 @@ class TracedCurve:
         return REACH
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """K, B, their slopes by the place, and the angles of the roots (k,) at places (k,)."""
+        """K, B, their slopes by the place, and the angles of the roots (k,) at places (k,); beside a limit
+        neither place nor slope is corrected."""
         points = self.traced.points
         j = np.clip(np.floor(parameters), 0, len(points) - 2).astype(int)
         places, slopes = self.traced.guess(j, parameters - j, self.scale), points[j + 1] - points[j]

@@ -116,7 +116,7 @@ class WallEquation:
         return self._terms(self._frame(thetas))
 
     def real_columns(self, z: float) -> tuple[Floats, Floats]:
-        """F and Y (r, r) at z = 1 or -1, where both are real; nan where no force moves what is read."""
+        """F and Y (r, r) at z = 1 or -1, where both are real; F nan where P has no inverse there."""
         inverse, one = self.inverse(z), np.eye(len(self.directions))
         if inverse is None:
             return np.full_like(one, np.nan), one
@@ -143,7 +143,7 @@ class WallEquation:
         P, dP = (S @ X @ S.T for X in self.loop.plant_slope(z, d))
         w, dw = self.loop.estimator.response(z, d)
         H = dH = None
-        if len(S) > 1:
+        if len(S) > 1:  # of one direction P alone is enough
             try:
                 H, dH = (S @ X @ S.T for X in self.loop.inverse_slope(z, d))
             except np.linalg.LinAlgError:  # readings that depend on each other
@@ -162,7 +162,8 @@ class WallEquation:
 
 
 def _forces_and_readings(P: Matrices, H: Matrices | None) -> tuple[Matrices, Matrices, Flags]:
-    """Forces F and readings Y (N, r, r) with Y = P F, and which columns (N, 1, r) are small singular values' of P.
+    """Forces F and readings Y (N, r, r) with Y = P F, and which columns (N, 1, r) are small singular values' of P:
+    none (N, r, r) where H is None.
 
     Large singular values are taken from P, small ones from its inverse H, which was computed without forming P:
     near z = 1 a free motion would hide the others in rounding.
@@ -171,6 +172,7 @@ def _forces_and_readings(P: Matrices, H: Matrices | None) -> tuple[Matrices, Mat
     F = _adjoint(V) / size[:, None, :]
     if H is None:
         return F, Y, np.zeros(F.shape, dtype=np.bool_)
+    # singular values of H descend, those of P that they belong to ascend
     forces, inverse, V = np.linalg.svd(H)
     readings = _adjoint(V) / inverse[:, None, :]
     # below the geometric mean of the largest and the smallest; the smallest is that of the inverse
@@ -210,8 +212,9 @@ def adjugate(W: Matrices) -> Matrices:
 def _common_eigenvalues(A: Complexes, B: Complexes, C: Complexes) -> tuple[Complexes, Complexes]:
     """k and b (N, r^2) at which A + k B + b C and its conjugate are singular, as exact as eigenvalues are.
 
-    Solutions at infinity are eigenvalues as well if combinations of all three Delta are taken. Where B or C is 0
-    there are lines of walls, and nan: C is, beside z = -1 behind a low pass, once w is 0 in rounding.
+    Solutions at infinity are eigenvalues as well if combinations of all three Delta are taken. Where A, B or
+    C is 0, nan: without B or C there are lines of walls; C is 0 beside z = -1 behind a low pass, once w is in
+    rounding.
     """
     sized = np.all([np.linalg.norm(X, axis=(1, 2)) > 0.0 for X in (A, B, C)], axis=0)
     if not sized.all():
@@ -290,7 +293,8 @@ def on_circle(thetas: Floats) -> tuple[Complexes, Complexes]:
 
 
 def features(loop: MultiLoop) -> Complexes:
-    """Points z (k,), Im z >= 0, where curves turn: poles, zeros of P, poles of w, real w on the circle."""
+    """Points z (k,), Im z >= 0, where curves turn: poles and zeros of P, poles of w and of the force filter, and
+    where on the circle w is real."""
     held, estimator, force = loop.sampled_plant, loop.estimator, loop.force_filter
     m = loop.count
     split = loop.fractional_delay > 0.0
@@ -308,6 +312,7 @@ def features(loop: MultiLoop) -> Complexes:
     thetas = np.linspace(0.0, np.pi, PHASES)[1:-1]
     w = estimator.response(*on_circle(thetas))[0].imag
     turns = np.flatnonzero(w[1:] * w[:-1] < 0.0)
+    # on the straight line between both angles
     share = w[turns] / (w[turns] - w[turns + 1])
     in_phase = np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0])))
     poles = [1.0 + np.linalg.eigvals(matrix) for matrix in (held.step, estimator.A, force.A)]
