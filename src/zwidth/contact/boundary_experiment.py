@@ -131,7 +131,7 @@ def _close_in_on_tip(
 
     columns  by damping, best one of them; the list is changed
     tell     called with the number of steps done, and of all six
-    Returns  the column of the tip
+    Returns  the column of the tip; a best one above which nothing is unstable is taken for it at once
     Raises   NoAnswerError  where, seen for longer, none of the columns is stable
     """
     within = _stiffness_range(box)
@@ -139,8 +139,9 @@ def _close_in_on_tip(
     while zoom < ZOOMS and best.bounded:
         index = columns.index(best)
         low, high = columns[max(index - 1, 0)], columns[min(index + 1, len(columns) - 1)]
-        between = np.linspace(low.damping, high.damping, ZOOMED + 2)[1:-1]
+        between = np.linspace(low.damping, high.damping, ZOOMED + 2)[1:-1]  # both ends are known
         B = np.unique(np.append(between, best.damping))
+        # from a little below all three; the first step of the march is to the best
         start = np.full(len(B), 0.9 * min(column.stiffness for column in (low, best, high)))
         # at a smooth peak, dampings four times as close differ by a sixteenth in stiffness
         tolerance = max(FIRST_ZOOM / 16.0**zoom, 0.01 * ACCURACY)
@@ -293,7 +294,8 @@ def _largest_stiffnesses(
     start      (m,)  stiffnesses [N/m] where the march upwards begins
     tolerance  of the result, as a share of the start;   within  softest and stiffest wall to be tried [N/m]
     step       (m,)  the first of the march [N/m]; None: half the start
-    Returns    a column for each damping; stiffness 0 where the start is unstable
+    Returns    a column for each damping; stiffness 0 where the start is unstable, or, of a nonlinear device, no
+               stable wall is met on the way
     """
     least, most = within
     m = len(B)
@@ -319,7 +321,8 @@ def _lowest_changes(
     """Replace the stiffnesses found at dampings (m,) by lower ones, where the verdict changes below them already.
 
     brackets  along stiffness [N/m];   least  softest wall to be tried [N/m];   tolerance  (m,) [N/m]
-    Returns  as `brackets` [N/m], stable 0 where no stable wall was met; and at which dampings the verdict changed
+    Returns  as `brackets` [N/m], stable 0 where no stable wall was met; and (m,) at which dampings the verdict
+             changes below already
     """
     lines = stiffness_lines(damping, least)
     # as distances from the lines' start
@@ -356,6 +359,7 @@ def measure_edges(
     farthest = np.where(sign < 0.0, starts[:, 1] - low, high - starts[:, 1])
     farthest = np.minimum(np.maximum(farthest, 0.0), 1e3 * scale)
     brackets = march(trial, lines, np.full(2 * k, 0.25 * scale), farthest)
+    # roughly from edge to edge; `scale` for an edge that was not found
     width = np.nan_to_num(brackets.unstable, nan=scale).reshape(2, k).sum(axis=0)
     tolerance = np.tile(ACCURACY * width, 2)
     brackets = bisect(trial, lines, brackets, tolerance)
@@ -411,7 +415,7 @@ def measure_tips(
 def _stable_starts(trial: StabilityTrial, damping: Floats, start: Floats, least: float) -> Floats:
     """Stiffnesses (m,) from which to march at dampings (m,): those of `start`, or 0 where the wall is unstable.
 
-    For a nonlinear device, unstable ones are first halved towards `least` [N/m] up to HALVED times.
+    For a nonlinear device, unstable ones are first halved towards `least` [N/m], HALVED walls being tried in all.
     """
     start = start.copy()
     lanes = np.arange(len(damping))
@@ -489,7 +493,8 @@ class Brackets(NamedTuple):
 def march(
     trial: StabilityTrial, lines: SearchLines, step: Floats, farthest: Floats, levels: int | None = None
 ) -> Brackets:
-    """Step outwards, twice as far each time, until a wall is unstable.
+    """Step outwards, twice as far each time, until a wall is unstable, or MARCHES steps are done; starts count as
+    stable.
 
     step      (m,)  the first distance;   farthest (m,)  the largest;   levels  see `observe`
     """
@@ -543,7 +548,7 @@ def nearest_change(
     """Move each bracket back to the first change of the verdict along its line, if there is one before it.
 
     Walls at SHARES of the distance to the bracket are tried; where none of them is stable, those at SHARES of the
-    distance to the first of them, up to LOWERED times.
+    distance to the first of them, and so on, LOWERED times in all.
 
     brackets      along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
     start_stable  True: each line's start is known to be stable; False: the first stable wall tried counts as start

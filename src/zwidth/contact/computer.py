@@ -389,7 +389,7 @@ class RunArrays(NamedTuple):
     push        (m, 9)   the hand's (see `hand`);   reflex (m, 7)
     observer    (m, Q)   the passivity controller's; nan in the first: none
     seed        (m,)
-    bound       (m,)     reading from the wall at which a run stops [m]
+    bound       (m,)     distance of the reading's motion from the wall at which a run stops [m]
     """
 
     device: Ints
@@ -408,7 +408,7 @@ class Records(NamedTuple):
 
     samples  (m,)           how many were run
     traces   (m, S, 5)      reading, truth, velocity, force, handle at each sample
-    handle   (m, S, n)      handle after each substep
+    handle   (m, S p)       handle after each of the p substeps behind each sample
     ledger   (m, S, 12)     energies at each sample
     """
 

@@ -418,6 +418,7 @@ def run_length(
         for wanted, why in ((_periods(frequency) / period, f"{PERIODS} periods"), (sound / period, "to be heard")):
             if min(wanted, most) > samples:
                 samples, reason = min(wanted, most), why
+        # 1e18: a loop that neither grows nor decays asks for infinitely many, which `_capped` cuts
         seconds = ceil(min(samples, 1e18)) * period
         return _capped(seconds + busy_until, f"{reason}, once the hand is done" if busy_until else reason, period)
     least = max(LEAST + busy_until, 2 * FEWEST * period)

@@ -147,6 +147,7 @@ def advance_substeps(
         here = swapped(here)
         if kept:
             trail[m, first + j] = dot(devices.handle, d, here.states, 0, n)
+    # states alternate between two arrays; after an odd number of substeps they are in the other one
     if (end - begin) % 2:
         keep_swapped(state)
 
@@ -262,7 +263,7 @@ def run_member(
     address: int,
     records: Records,
 ) -> None:
-    """Run m: everything from the first sample to the last, or until the reading has left its bounds.
+    """Run m: everything from the first sample to the last, or until the reading's motion has left its bounds.
 
     samples  to be run;   address  of the environment's machine code;   records  are filled in
 

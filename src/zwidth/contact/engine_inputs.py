@@ -45,7 +45,8 @@ class HeldDevice:
     """
 
     def __init__(self, loop: Loop, hand: Hand) -> None:
-        """Attach the hand's operator to the loop's plant, and list the nonlinear elements of both."""
+        """Attach the hand's operator to the loop's plant, and list the nonlinear elements of both, the computer's
+        sampled forces last."""
         operator = hand.operator
         self.loop = loop
         self.attached_plant = loop.plant if operator is None else attach(loop.plant, operator)
@@ -193,6 +194,7 @@ def interval_parts(loop: Loop, substeps: int) -> list[IntervalPart]:
     """
     f, local = loop.fractional_delay, loop.controller.local_loop  # f: share of the interval until the command acts
     if local is None or not acts(local):
+        # substeps until the new command acts: at least one, and one is left for the time after it
         early = min(max(1, round(f * substeps)), max(substeps - 1, 1)) if f > 0.0 else 0
         parts = [IntervalPart(f, early, False, NOTHING_LOCAL)] if early else []
         return [*parts, IntervalPart(1.0 - f, max(substeps - early, 1), True, NOTHING_LOCAL)]
@@ -212,7 +214,7 @@ def interval_parts(loop: Loop, substeps: int) -> list[IntervalPart]:
 
 def reading_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Floats:
     """Weights (D, N + 2 + E) of states, command, push and elements in what each device's force sensor measures:
-    the force of the hand, less what the mass between sensor and hand takes.
+    the force of the hand, less what the mass between sensor and hand takes. Zeros for a device without one.
     """
     N, E = plants.transition.shape[-1], plants.kind.shape[1]
     rows = np.zeros((len(held_devices), N + 2 + E))
@@ -416,6 +418,7 @@ def _integrated_form(A: Floats, Q: Floats) -> Floats:
     from scipy.linalg import expm
 
     M = len(A)
+    # so many that the first stretch is no longer than a norm of 1 allows
     doublings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(A, 1)), 1e-300)))))
     block = np.zeros((2 * M, 2 * M))
     block[:M, :M], block[:M, M:], block[M:, M:] = -A.T, Q, A

@@ -76,7 +76,8 @@ def device_plane(
     motion, Delta the step of the reading when all encoders step, unless they are given.
 
     coulomb_friction  f_c [N];  resolution  Delta [m]
-    Raises            FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law
+    Raises            FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law,
+                                     and for a load
                       ValueError   for a wall that is not positive; where the plant has no free motion, or
                                    neither it nor the arguments say what f_c and Delta are
 

@@ -219,6 +219,7 @@ def _parts(
     """The plant's nonlinear parts, with friction and encoder steps given here, and the force limit [N].
 
     coulomb_friction, resolution, force_limit  [N], [m], [N], as in `harmonic_balance`; None: the loop's own
+    Raises  ValueError  for one of them that is negative, a limit of 0, or frictions of a wrong shape
     """
     plant, parts = loop.plant, loop.plant.nonlinear
     if coulomb_friction is not None:
@@ -244,6 +245,7 @@ def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Flo
     """Amplitudes (p,) to look at [m]: even in the logarithm, and denser where the quantiser's gain has its humps.
 
     bounds  lowest and highest [m]; None: by what the nonlinear parts suggest, none where they suggest nothing
+    Raises  ValueError  for bounds that are not positive and finite, the lower first
     """
     T, parts = loop.loop.period, loop.parts
     stiffness = abs(loop.wall_stiffness) + abs(loop.wall_damping) / T
@@ -278,7 +280,9 @@ def _fastest_by_amplitude(
 ) -> list[Vibration | None]:
     """The fastest growing vibration at each amplitude (p,) [m], followed down and up; None where nothing swings.
 
-    More than one kind of vibration may agree with the gains that it makes itself, so both ways count.
+    More than one kind of vibration may agree with the gains that it makes itself, so both ways count, and on the
+    way up every SEEDED amplitudes others are looked for.
+
     tell  called with how many amplitudes are done, of both ways
     """
     last = loop.first_guess(float(amplitudes[-1]))
@@ -290,6 +294,7 @@ def _fastest_by_amplitude(
     swings: list[Vibration | None] = []
     for k, (amplitude, other) in enumerate(zip(amplitudes, down[::-1], strict=True)):
         tell(len(amplitudes) + k)
+        # from the vibration that was found on the way down there is nothing else to find
         starts = [] if other is not None and abs(other.root - last.root) < ROUGHLY else [last]
         if k % SEEDED == 0:
             starts += [loop.seed(float(amplitude), angle * np.pi) for angle in ANGLES]
@@ -319,7 +324,8 @@ def _frequency(loop: EquivalentLoop, swing: Vibration) -> float:
 def _crossings(loop: EquivalentLoop, at: Floats, swings: list[Vibration | None]) -> list[LimitCycle]:
     """Limit cycles where growth changes sign between amplitudes `at` (p,) [m], stable where larger ones die.
 
-    swings  vibration at each; None: nothing swings
+    swings  vibration at each; None: nothing swings, which counts as dying
+    Returns by amplitude; none where the growth jumps from one sign to the other
     """
     crossings = []
     for smaller, larger in pairwise(swings):
@@ -402,10 +408,10 @@ FAR = 4.0  # times: a step to another cycle is none
 def with_harmonics(
     loop: Loop, wall_stiffness: float, wall_damping: float, cycle: LimitCycle, force_limit: float | None = None
 ) -> LimitCycle:
-    """Refine a limit cycle with up to 16 odd harmonics: amplitude, frequency and force are half peak to peak.
+    """Refine a limit cycle with up to 16 odd harmonics: amplitude and force are then half of peak to peak.
 
-    Only the limit of the force is taken for nonlinear. Where Newton's method fails the cycle of the harmonics that
-    it could follow is returned, of the first alone the one that was given.
+    Only the limit of the force is taken for nonlinear. Where Newton's method fails, the cycle of as many harmonics
+    as it could solve for is returned; the given one where it fails for the first already.
 
     cycle       by `limit_cycles` of a loop without dry friction, counters and bent springs that act
     force_limit  largest force [N]; None: the smaller of the controller's and the actuator's limits

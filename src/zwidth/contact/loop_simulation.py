@@ -73,7 +73,7 @@ def simulate(
 
     environment    what is touched;   values (P,) of its parameters, as `Environment.values` gives them
     duration       [s]
-    substeps       between samples, where something is nonlinear; a linear plant is exact with any
+    substeps       between samples, where something is nonlinear or the push changes; all else is exact with any
     trail          keep the handle's position after each substep
     ledger         keep the energies
     circumstances  hand, start_position [m], wall_position [m] and so on: see `Run`
@@ -108,7 +108,7 @@ def simulate_batch(
 
     runs      of any loops, hands and starts;   environment  the one thing that all of them touch
     duration  of all runs, or of each [s]
-    substeps  between samples, where something is nonlinear; a linear plant is exact with any
+    substeps  between samples; 1 is taken where no plant has a nonlinear part, nor trail or ledger is kept
     progress  called with "simulating", the samples done, and those of all runs
     Returns   one response for each run, in their order
     Raises    ValueError  for a duration or a number of substeps that cannot be meant, starts of a wrong shape
@@ -122,6 +122,7 @@ def simulate_batch(
     # 1e-12: a whole number of periods that rounding has made a little longer gets no sample more
     samples = np.array([1 + ceil(length / T * (1.0 - 1e-12)) for length, T in zip(lengths, period, strict=True)])
     m, S = len(runs), int(samples.max())
+    # nothing is kept between samples, and a linear plant is exact with any number while the push is steady
     if not trail and not ledger and not any(held_device.elements for held_device in held_devices):
         substeps = 1
     plants = pack_plants(held_devices, substeps)

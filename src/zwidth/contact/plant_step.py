@@ -205,7 +205,7 @@ def keep_swapped(state: PlantState) -> None:
 
 @compiled_inline
 def solve_forces(devices: PlantArrays, d: int, part: int, coulomb: bool, state: PlantState) -> None:
-    """Fill in the forces of the elements; those that move one another settle by Gauss-Seidel.
+    """Fill in the forces of the elements, by Gauss-Seidel as they move one another, and then bend the bristles.
 
     coulomb  True: all are Coulomb frictions; where a call says so, the code of the other kinds is not compiled
     """
@@ -305,7 +305,7 @@ def element_force(
     mobility: float,
     h: float,
 ) -> float:
-    """Mean force [N] of element e of device d over a substep of length h [s].
+    """Mean force [N] of element e of device d over a substep of length h [s]; 0 for NOTHING.
 
     numbers  (D, E, 6)  COULOMB: level [N];   BRISTLES: as of `bristle_force`;   SPRING: law and kink, as of
              `bent_spring_force`;   VARYING: ROLE to BRAKE_LAG;   SAMPLED: FILTERED and ACTUATOR_LAG

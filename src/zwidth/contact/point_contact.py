@@ -74,8 +74,8 @@ def simulate_contact(
 
     point              the device, and the operator who holds it
     stiffness, damping  of the wall, or of an environment that has them [N/m], [N s/m]; a wall needs a stiffness
-    wall               whether the wall acts on both sides of its position, under load of that from which F/K is
-                       left
+    wall               whether the wall acts on both sides of its position; under load, a one-sided one acts up to
+                       F/K outside the posture that it holds
     no_pull            the one-sided wall, or an environment that can, never pulls the device inwards
     environment        something else to touch: an Environment, a bundled name or "file.py:name"; None: the wall
     parameters         of the environment by name; those left out have its defaults
@@ -91,7 +91,8 @@ def simulate_contact(
                        The same run is then made without it, too
     duration           simulated time [s]; None: a tenfold change at the predicted rate and at least eight periods,
                        at most 60 s; 2 s and more where something is not linear (see `run_length`)
-    substeps           integration steps per sample, where the device or the environment is not linear
+    substeps           integration steps per sample; at most 20 of a linear device under a steady push, which is
+                       exact with any
     seed               of the encoders' noise
     trail              keep the handle's position after each substep
     seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]
@@ -171,6 +172,7 @@ def _simulate(
     run, touched = contact.run, contact.environment
     runs = [run]
     if passivity_damping is not None:
+        # in front, as the run that is judged
         runs.insert(0, replace(run, passivity=PassivityController(passivity_damping)))
     controlled = len(runs) > 1
     substeps = needed_substeps(run.loop, run.hand, contact.substeps)
@@ -316,7 +318,7 @@ def _under_load(
 
     Returns  the wall's sides, the environment (None: the two-sided wall), and the parameters, with the load
 
-    Raises  ArgumentError  for anything but a wall, on which no hand leans
+    Raises  ArgumentError  for another environment, and for a one-sided wall on which no hand leans
     """
     if environment is not None:
         raise ArgumentError("environment", "does not go with a load, which the wall holds; leave one out")

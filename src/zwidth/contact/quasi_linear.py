@@ -216,13 +216,17 @@ def equivalent_loop(
 ) -> EquivalentLoop:
     """The loop with its nonlinear parts, whose counters make up the sensor (none: read as finely as you like).
 
+    Left out are noise, brakes, frictions of level 0, and counters if none of them has steps.
+
     force_limit  the smallest limit on the force [N];  offset  see `EquivalentLoop`
-    Raises       FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law
+    Raises       FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law, and
+                                for a load
     """
     check_no_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
     check_no_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
     counters = parts.counters
     if any(part.step > 0.0 for part in counters):
+        # without noise
         counters = tuple(Counter(part.along, part.step, part.weight) for part in counters)
     else:
         counters = ()

@@ -106,8 +106,9 @@ class StabilityTrial:
 
     @cached_property
     def first_samples(self) -> int:
-        """Samples watched at first: four periods of the slowest vibration of the device without a wall; of a given
-        time so many that the last look takes all of it."""
+        """Samples watched at first: FIRST_SAMPLES or, where that is more, four periods of the slowest vibration of
+        the device without a wall, up to MOST_PERIODS samples, and LEAST_SECONDS_HELD where somebody holds it; of a
+        given time so many that the last look takes all of it."""
         if self.watch_time is not None:
             return max(ceil(self.watch_time / self.loop.period / float(LONGER ** (LEVELS - 1))), LEAST_SAMPLES)
         frequencies = natural_frequencies(self.loop.plant)
@@ -120,7 +121,8 @@ class StabilityTrial:
         )
 
     def linearised(self) -> StabilityTrial:
-        """The same trial with the linear part of the device only, and a two-sided wall."""
+        """The same trial without nonlinear parts and force limit, on a two-sided wall, the hand only holding. The
+        disturbance is a displacement alone, and every motion counts as visible."""
         plain = replace(self.loop.plant, nonlinear=Nonlinear())
         feedforward = self.loop.controller.feedforward
         smooth = None if feedforward is None else replace(feedforward, coulomb=0.0)
@@ -212,7 +214,7 @@ def _verdict(
     if response.given_up or not np.all(np.isfinite(response.truth)):
         return False
     growth = judged.growth
-    still = np.isnan(growth)
+    still = np.isnan(growth)  # nothing moves
     if trial.linear:
         if still:
             return True

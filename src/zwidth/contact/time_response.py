@@ -195,6 +195,8 @@ class Judgement:
     amplitude     half of peak to peak of the handle in the last quarter [m]
     frequency     dominant in the second half [Hz]; nan where nothing moves
     contact       share of the second half with a force
+
+    A run that is too short to judge has growth and frequency nan, and the others of the whole run.
     """
 
     behaviour: Behaviour
@@ -212,7 +214,7 @@ class Judgement:
 
 
 def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement:
-    """Judge a run; one with fewer than 16 samples is undecided, unless it has left its bounds.
+    """Judge a run; one with fewer than 16 samples is undecided, unless it has left its bounds by growing.
 
     drifts  whether a steady push moves the device where no stiffness holds a position: leaving the bounds is no
             growth then
@@ -240,6 +242,7 @@ def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement
             judged, float("nan"), _half_peak_to_peak(response.handle), float("nan"), float(touching.mean())
         )
     third, last, half = slice(S // 2, S // 4 * 3), slice(S // 4 * 3, S), slice(S // 2, S)
+    # of the place or, with `drifts`, of the velocity
     changes = np.diff(response.truth, n=2 if drifts else 1)
     size = float(np.abs(changes[np.isfinite(changes)]).max(initial=0.0))
     before, after = _rms(changes[S // 2 : S // 4 * 3]), _rms(changes[S // 4 * 3 :])
@@ -269,13 +272,15 @@ def _behaviour(
 
     touching     (S,)  whether a force acts at a sample
     third, last  the quarters of the run that are compared
-    growth       logarithm of the last quarter's motion over the third's
-    moving       whether anything moves in the last quarter;   drifts  as in `judge_response`
+    growth       logarithm of the last quarter's changes over the third's; nan without such changes
+    moving       whether the place, with `drifts` the velocity, changes in the last quarter, or the device has left
+                 its bounds by growing;   drifts  as in `judge_response`
     """
     if (response.given_up and not drifts) or not np.all(np.isfinite(response.truth)):
         return "growing"
     inside = float(touching[last].mean())
     if response.surface and inside == 0.0 and not touching[third].any():
+        # a hand may still push a device to the wall that has never touched it
         return "lost contact" if touching.any() or not response.held else "undecided"
     if inside < 1.0 and response.surface:
         return "bouncing" if growth > -TREND else "undecided"
@@ -292,7 +297,7 @@ def _behaviour(
 
 
 def _at_rest(response: TimeResponse, last: slice) -> bool:
-    """Whether the motion in the quarter `last` is smaller than what the encoders resolve."""
+    """Whether the motion in the quarter `last` is smaller than what encoders resolve, or their noise keeps up."""
     swing = _half_peak_to_peak(response.truth[last])
     if response.noise > 0.0:
         return swing < 0.5 * response.quantum + 3.0 * response.noise
@@ -314,7 +319,8 @@ def _half_peak_to_peak(signal: Floats) -> float:
 
 
 def dominant_frequency(signal: Floats, period: float) -> float:
-    """Frequency with the most of a signal's motion [Hz], from 0 to 1/(2T); nan for one that does not move.
+    """Frequency with the most of a signal's motion [Hz], between 0 and 1/(2T); nan for one that does not move, has
+    fewer than 16 samples, or is not finite.
 
     The peak of the spectrum of a Hann-windowed signal less its straight line, between bins by a parabola through
     the logarithms. For a steady tone it is right to about a hundredth of 1/(length).
@@ -332,7 +338,7 @@ def dominant_frequency(signal: Floats, period: float) -> float:
     if not size > 0.0:
         return float("nan")
     spectrum = np.abs(np.fft.rfft(windowed / size, 4 * k))  # four times as fine as the length gives
-    peak = int(np.argmax(spectrum[1:-1])) + 1
+    peak = int(np.argmax(spectrum[1:-1])) + 1  # one with a neighbour on either side
     before, at, after = np.log(np.maximum(spectrum[peak - 1 : peak + 2], 1e-300))
     bend = before - 2.0 * at + after
     shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0

@@ -117,10 +117,11 @@ def touch_step(touch: Touch, ports: Floats, push: float, drawn: Floats, outputs:
     """One sampling period: read, estimate, render, filter, limit, send, and move under a constant push [N].
 
     ports    LAW to WALL are read
-    drawn    (1, C)        noise of each encoder's position, drawn already
-    outputs  (., OUTPUTS)  the row is written with what is so at the sample; the states are those at its end
+    drawn    (C,)          noise of each encoder's position, drawn already
+    outputs  (., OUTPUTS)  the row is written with what is so at the sample, while the states go on to the next one
     """
     devices, computer, signals, state = touch.devices, touch.computer, touch.signals, touch.state
+    # begun: the estimate asks of a sample's number only whether it is the first
     n, states, begun = devices.size[0], state.states, 0 if touch.period[0] == 0.0 else 1
     truth = dot(devices.sensor, 0, states, 0, n)
     reading = read_sensor(devices, 0, states, truth, drawn)

@@ -159,8 +159,8 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
 def transition(
     loop: LoopArrays, sizes: Floats, passes: float, states: Floats, forces: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Transition (M, M) of the loop whose gains are those of a vibration; the velocities (t, n, M) at times within
-    the sample, from its beginning to its end [m per sample]; and the commanded force (M,).
+    """Transition (M, M) of the loop whose gains are those of a vibration; the velocities (t + 1, n, M) at the
+    sample's beginning and at the t times of `plant_steps` [m per sample]; and the commanded force (M,).
 
     passes  share of the force that acts; negative: what its limit lets pass
     states, forces  as `plant_steps` returns them
@@ -212,6 +212,7 @@ def transition(
     for i in range(n):
         inside[0, i, n + i] = 1.0
     for t in range(times):
+        # within the sample only velocities are wanted, at its end all states
         last = t == times - 1
         for i in range(0 if last else n, N if last else 2 * n):
             row[:] = 0.0

@@ -74,11 +74,13 @@ def predict_limit_cycles(
     stiffness, damping  of the wall [N/m], [N s/m]
     offset    middle of the vibration, as a share of an encoder step: 0 on a count, 0.5 halfway between two, the
               most that a constant push can do
-    simulate  simulate from near each stable cycle within the range, or from close by where there is none
+    simulate  simulate from near each stable cycle within the range, or from close by where there is none, and from
+              large starts where the force is limited
     progress  called with a stage's name, steps done, steps of all
     Raises    NoAnswerError   where nothing depends on the amplitude
               ArgumentError     for an offset where no encoder has steps
               ValueError              for a wall that is not finite, an offset beyond half a step
+              FeedbackError     for a computer with feedback beside the wall law, and for a load
               HysteresisError, UnmovedError  (loop.sections) for plants that no wall moves, or not in time
               what `OperatingPoint.plant` raises
 
@@ -225,7 +227,7 @@ def _simulate_near_cycle(
 def _simulate_small_start(
     loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...]
 ) -> SimulatedVibration:
-    """Simulate from a start of a few counts, well within the smallest cycle, where vibration should decay.
+    """Simulate from a start of a few counts, or SMALL without encoder steps, but well within the smallest cycle.
 
     K, B  of the wall [N/m], [N s/m];   offset  middle of the vibration, as a share of an encoder step
     """
@@ -243,7 +245,8 @@ def _simulate_large_starts(
 
     largest       motion of the device, beyond which no run starts [m]
     K, B, offset  as in `_simulate_small_start`
-    Returns       where each run ends; none where the force has no limit
+    Returns       where each run ends; none where the force has no limit, the wall no spring, or all starts are
+                  beyond the largest motion
     """
     limit = loop.nonlinear.force_limit
     if not (limit < inf and K > 0.0):
@@ -259,7 +262,8 @@ def _simulate_large_starts(
 def _simulate_starts(
     loop: Loop, K: float, B: float, offset: float, starts: list[float], frequency: float
 ) -> list[SimulatedVibration]:
-    """Simulate a wall from starts [m] off the middle, for CYCLES periods of a frequency [Hz]; where each ends.
+    """Simulate a wall from starts [m] off the middle, for CYCLES periods of a frequency [Hz] but FEWEST to MOST
+    samples; where each ends.
 
     K, B, offset  as in `_simulate_small_start`
     """
@@ -274,7 +278,7 @@ def _simulate_starts(
             values,
             start=(middle + start * shape, np.zeros(loop.plant.size)),
             wall_position=wall_position,
-            bound=max(1.0, 1e3 * start),
+            bound=max(1.0, 1e3 * start),  # m, where it has grown beyond all that a device does
         )
         for start in starts
     ]
@@ -501,7 +505,7 @@ def answered_cycles(
     others: Sequence[SimulatedVibration],
     largest_motion: float,
 ) -> Answers:
-    """Compare predicted cycles with simulations.
+    """Compare predicted cycles with simulations, and add those that only simulations have.
 
     runs    of each predicted cycle, from both sides of it; () for one that was not simulated
     others  from other starts
@@ -543,7 +547,7 @@ def _nearest(cycle: LimitCycle, runs: Sequence[SimulatedVibration]) -> Simulated
 
 def _outcome(cycle: LimitCycle, runs: Sequence[SimulatedVibration], nearest: SimulatedVibration) -> Outcome:
     """What runs from both sides say of a predicted cycle: "same", they end in it; "other", in another one; "none",
-    in none; "open", none has settled.
+    in none, all being still or growing beyond the range; "open", none has settled.
 
     nearest  run that ends nearest to the cycle
     """

@@ -132,7 +132,8 @@ def broadcast_walls(
     """Stiffness [N/m] and damping [N s/m] of walls, broadcast to one shape.
 
     finite  must all of them be finite? A single wall must; among many, one that is not is the caller's to mark
-    Raises  ValueError  for what are no numbers, for shapes that do not go together, for a single wall with nan
+    Raises  ValueError  for what are no numbers, for shapes that do not go together, for what is not finite of a
+            single wall or with `finite`
 
     >>> broadcast_walls([1000.0, 2000.0], 5.0)
     (array([1000., 2000.]), array([5., 5.]))

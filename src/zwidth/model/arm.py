@@ -121,7 +121,7 @@ def _names_of_arm_motions(joint_names: tuple[str, ...], hand: Floats) -> tuple[s
 
 def _arm_posture(arm: Arm, place: Floats) -> Floats:
     """Joint coordinates (a,) of the arm with its hand at a place (3,) [m], from those of its assembly by least
-    motion.
+    motion; without a shoulder those of the assembly.
 
     Raises  OperatorError  where the hand cannot get there
     """

@@ -166,6 +166,7 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
         return Shapes(*(field[..., [2, 0, 1, 3]] for field in by_family))
 
     panels = gauss_panels(np.union1d(_loaded(at), [0.0, L]), ELEMENT_ORDER)
+    # with the tip as one more station, the last, at which the lump is
     tip = body_of_shapes(beam, shapes, panels, np.append(at, L))
     m, I = beam.mass_per_length * L, beam.torsional_inertia_per_length * L
     lump = m * np.array([BAR_LUMP, BENDING_LUMP, BENDING_LUMP])

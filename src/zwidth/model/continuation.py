@@ -86,7 +86,8 @@ def set_goal(mech: MechanismArrays, goals: Floats, i: int, work: WorkingMemory) 
 @compiled_lean
 def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float, work: WorkingMemory) -> float:
     """Newton from `angles` (in place) to `work.goal`. Returned is the last reciprocal condition, or -1 where it
-    left the branch: a correction that does not contract, joints that turn far, or a singularity passed.
+    left the branch: a correction that does not contract, joints that turn far, or a singularity passed. Whether
+    the goal is reached the gaps tell.
 
     tolerance  largest error left in an unknown, in its unit: that after a correction of size s, smaller by the
                ratio r than the one before, is about s r^2
@@ -318,7 +319,8 @@ def _keep_posture(mech: MechanismArrays, work: WorkingMemory, angles: Floats, ga
 
 @compiled_lean
 def assemble(mech: MechanismArrays, design: int, hold: bool, angles: Floats, work: WorkingMemory) -> None:
-    """Close one design's loops from rough joint coordinates angles (n,) (in place), by Levenberg-Marquardt.
+    """Close one design's loops from rough joint coordinates angles (n,) (in place), by Levenberg-Marquardt. Free
+    joints stay.
 
     hold  True: the handle is taken to `work.goal`, too; False: it goes where the loops have it
 
@@ -380,7 +382,8 @@ def moved_posture(mech: MechanismArrays, angles: Floats, step: Floats) -> Floats
     moved by a step (c,), in parts of STEP; None where the loops cannot follow.
 
     mech    of one design
-    angles  (n,) of a posture with closed loops [rad], [m]. Free ball joints are not moved
+    angles  (n,) of a posture with closed loops [rad], [m]
+    step    0 for free ball joints, whose coordinates are not put together by adding
     """
     out = np.array(angles, dtype=np.float64)
     # 1e4: a limit, so that int takes a step that is inf, too

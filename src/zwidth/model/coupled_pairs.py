@@ -45,8 +45,10 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
 
     operator  at the handle: one for all, or with numbers of N designs; None: nobody
     period    () or (N,)  at which they are sampled [s]: up to half that rate the pairs are held against the plants
-    Returns   nan as reach for a plant that has to be computed by itself, otherwise: without modes; with a motion
-              that nothing holds or brakes though others move it; with poles that are nearly double
+    Returns   the pairs, one more of each plant where some have free motions. Reach is nan for a plant that has to
+              be computed by itself, in another way: whose matrices are not known (see `_plant_matrices`); with a
+              motion that nothing holds or brakes though others move it; with poles that are nearly double; with
+              parts that cannot be told from rounding
     """
     M, B, K, ends, known = _plant_matrices(modes, operator)
     # sum of |input| times sum of |output|, see `PolePairs`: shares of parts are told against it
@@ -71,10 +73,11 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
 def _plant_matrices(
     modes: RenderedModes, operator: Operator | None
 ) -> tuple[Floats, Floats, Floats, Floats, Flags]:
-    """M, B, K (N, n, n) of each plant; ends (2, N, n), its input and its output; and (N,) whether it has modes.
+    """M, B, K (N, n, n) of each plant; ends (2, N, n), its input and its output; and (N,) whether these are known.
 
-    Where it has none, M and K are unit matrices and the rest is 0. The arm of an elastic grasp is the last
-    coordinate.
+    Known where the plant has modes, with an operator also their motions at the handle, and with an elastic grasp
+    an arm with mass. Elsewhere `ends` are 0, and the matrices only such that M can be inverted. The arm of an
+    elastic grasp is the last coordinate.
     """
     N, m = modes.decay.shape
     elastic = operator is not None and not operator.rigid_grasp
@@ -115,7 +118,8 @@ def _set_aside_free_motions(B: Floats, K: Floats, ends: Floats) -> Floats:
     place).
 
     Each gets a spring of its own instead, and neither input nor output, so that it has no part in the response.
-    Returns (N,) [1/kg] the sum over these motions of input times output: their response is this over s^2.
+    Returns (N,) [1/kg] the sum over these motions of input times output: their response is this over s^2, where M
+    does not couple them with others.
     """
     diagonal = np.arange(K.shape[1])
     free = ~(np.abs(K).max(axis=2) > 0.0) & ~(np.abs(B).max(axis=2) > 0.0)
@@ -147,8 +151,8 @@ def _fill_pairs(
 ) -> None:
     """Fill decay, squared, position and velocity (N, n), as of `PolePairs`, of plants first to last - 1.
 
-    Those whose reach (N,) is not finite are passed over. Where a plant's poles are nearly double, or its parts do
-    not add up to its response, its reach is made nan.
+    Those whose reach (N,) is not finite are passed over. Where a plant's poles are nearly double or cannot be
+    joined (see `_join_poles`), or its parts do not add up to its response, its reach is made nan.
 
     ends     (2, N, n)  input and output;   poles (N, 2 n)  rough ones, of each plant
     periods  (1,) or (N,)  sampling periods [s]
@@ -297,9 +301,9 @@ def _join_poles(
 ) -> bool:
     """Fill one plant's parts of second order (n,) from `count` poles p with Im >= 0 and their residues r.
 
-    False where that cannot be: one part is hidden to all but rounding, or real poles do not come in pairs. Parts
-    that the force does not move or the sensor does not read are set to zero. Residues of real poles are
-    overwritten.
+    False where that cannot be: one part may be rounding or not, or real poles do not come in pairs. Position and
+    velocity are 0 of parts of complex poles that the force does not move or the sensor does not read. Residues of
+    real poles are overwritten.
     """
     parts = 0
     for k in range(count):

@@ -315,7 +315,8 @@ def counted_posture(
 
     start    motions of the device;   angles (n,)  its joint coordinates
     ahead    (d,)  by what the counted coordinates are ahead of those of its joints
-    Returns  None where the joints cannot be there, or the drives do not determine where they are
+    Returns  None where the joints cannot be there, the drives do not determine where they are, or the search does
+             not settle
     """
     mech, at, motions, k = start.mech, angles, start, len(mechanism.driven)
     for _ in range(STEPS):
@@ -331,6 +332,7 @@ def counted_posture(
             return None
         if np.max(np.abs(step), initial=0.0) <= SETTLED:
             return CountedPosture(at, motions, drives, np.asarray(seen, dtype=np.float64))
+        # the free joints stay
         moved = moved_posture(mech, at, np.append(step, np.zeros(motions.count - k)))
         if moved is None or not np.isfinite(moved).all():
             return None
@@ -484,7 +486,8 @@ def _solve(A: Floats, h: Floats) -> Floats:
 
 def _compliance(T: Floats, spring: Floats, h: Floats, bending: Floats | None = None) -> Floats:
     """h^T (T^T K T)^-1 h (N,) of T (N, d, c), h (N, c) and K the drives' springs (N, d), inf of rigid drives.
-    These are the limit: they leave the motions Y of T_r Y = 0, T_r being their rows of T.
+    These are the limit: they leave the motions Y of T_r Y = 0, T_r being their rows of T; the form is 0 where they
+    leave none, and nan where T is.
 
     bending  (c, c)  stiffness of the links, which is added
     """
@@ -494,6 +497,7 @@ def _compliance(T: Floats, spring: Floats, h: Floats, bending: Floats | None = N
         motions = np.eye(T.shape[2])
         if not flexible.all():
             _, values, rows = np.linalg.svd(T[k][~flexible])
+            # the right vectors beyond the rank
             motions = rows[int(np.sum(values > 1e-12 * values[0])) :].T
         moved = T[k][flexible] @ motions
         A, b = moved.T @ (spring[k][flexible, None] * moved), motions.T @ h[k]
@@ -503,7 +507,7 @@ def _compliance(T: Floats, spring: Floats, h: Floats, bending: Floats | None = N
 
 
 def unit_directions(directions: ArrayLike) -> Floats:
-    """Directions as an array (..., 3), each checked to be of unit length."""
+    """Directions as an array (..., 3), each of unit length. Raises ValueError for others."""
     u = np.asarray(directions, dtype=np.float64)
     if u.ndim == 0 or u.shape[-1] != 3:
         raise ValueError(f"a rendered direction has three components, got an array of shape {u.shape}")

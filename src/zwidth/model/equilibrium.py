@@ -232,7 +232,8 @@ class Balance:
         load at once leads nowhere, it is brought on in steps.
 
         near    the equilibrium of a neighbouring posture, from which this one is looked for first; None: from none
-        Raises  LoadError, too, for a push that the hand cannot give
+        Raises  LoadError         for a push that the hand cannot give
+                EquilibriumError  where none is found, or the links buckle
         """
         if self.normal is not None and not np.any(self._push_of_torques()):
             linear = bool(np.any(self.screw[:3]))
@@ -299,7 +300,7 @@ class Balance:
             if not np.max(np.abs(step[: len(self.flexible)]), initial=0.0) < LARGEST_STEP:
                 return None
             ahead[self.flexible] -= step[: len(self.flexible)]
-            f -= step[-1] if self.normal is not None else 0.0
+            f -= step[-1] if self.normal is not None else 0.0  # without a push it stays 0, and has no equation
         return None
 
     def _scale(self, s: Floats) -> float:
@@ -335,8 +336,8 @@ class Balance:
         s: Floats,
         f: float,
     ) -> tuple[Floats, Floats]:
-        """Errors of the balance, and their derivatives by the deflections of the flexible drives and the wall's
-        force.
+        """Errors of the balance, and their derivatives by the deflections of the flexible drives and, where a push
+        is asked for, by the wall's force.
 
         The errors are, for each flexible drive, its spring's torque less the motor's; and where a push is asked
         for, the push along the direction less that.

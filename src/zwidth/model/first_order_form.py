@@ -54,7 +54,8 @@ class FirstOrderForm:
 
 
 def first_order_form(plant: Plant, period: float, second_reading: Floats | None = None) -> FirstOrderForm:
-    """The plant's first-order form on coordinates, velocities [m per period] and forces of lagged dampers.
+    """The plant's first-order form on coordinates, velocities and those that lagged dampers follow with their lag,
+    both [m per period].
 
     Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
     pole at 0 is known exactly. Where motions that are braked only have come to is told by what of it the sensor
@@ -95,7 +96,7 @@ def _second_output(
 ) -> Floats:
     """Weights (N,) of a form's states in a reading rows . [x'', x', x], without what the force adds to x''.
 
-    A               (N, N)  dynamics of the form, whose last `lag_count` states are forces of lagged dampers
+    A               (N, N)  dynamics of the form, whose last `lag_count` states are those of lagged dampers
     elastic, basis  (n, e), (n, k)  motions of the form's places, the last of them, and of its velocities
     rows            (3, n)
     """
@@ -127,6 +128,7 @@ def _split_motions(plant: Plant, second_reading: Floats | None) -> tuple[Floats,
     rigid, elastic = shapes[:, squared == 0.0], shapes[:, (squared != 0.0) & ~idle]
     # motions without stiffness may be combined: along the axes of their damping each has its own, or none
     brakes, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
+    # damping that is rounding: of motions that slide
     level = 1e-13 * max(float(np.max(np.abs(shapes.T @ drag @ shapes))), np.finfo(float).tiny)
     slides = np.abs(brakes) <= level
     return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic, shapes[:, idle]
@@ -144,7 +146,7 @@ def _poles_of_idle(plant: Plant, motions: Floats) -> Complexes:
 
 def _state_matrices(plant: Plant, braked: Floats, basis: Floats, period: float) -> tuple[Floats, Floats, Floats]:
     """A (N, N), input and output (N,) on the states [what is read of the braked motions, elastic coordinates,
-    velocities of both, forces of the lagged dampers].
+    velocities of both, velocities z that lagged dampers follow:  tau z' + z = along . v,  their force being b z].
 
     braked, basis  (n, b), (n, k)  mass-normalised motions: those without stiffness, and all, elastic ones behind
                    them
@@ -255,6 +257,7 @@ def invariant_subspace(form: FirstOrderForm, poles: Complexes) -> tuple[Floats, 
     from scipy.linalg import matrix_balance, schur
 
     every = np.concatenate([form.poles, form.hidden_poles])
+    # exactly 0, as they are the form's own numbers
     wanted = np.min(np.abs(every[:, None] - poles), axis=1, initial=np.inf) == 0.0
 
     def chosen(value: complex) -> bool:

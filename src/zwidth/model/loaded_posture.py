@@ -62,7 +62,7 @@ def loaded_postures(
     posture  as it is asked for; one that was found under load stands for the one that it was found from
     screws   (..., 6)  rendered directions;   counts_motors  whether encoders are on the motors, or behind the
              drives
-    Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM
+    Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM, its numbers nan
     Raises   EquilibriumError, LoadError  for a single posture without one
              LoadError  for a load that can be meant in no posture of a batch
     """
@@ -164,7 +164,7 @@ class _Balances:
 
 def _behind_motors(mechanism: Mechanism, asked: Posture, at: Posture, balances: _Balances) -> Posture:
     """The links' posture, searched for from `at`, where the motors count the one that is asked for: behind it by
-    the bending of the drives."""
+    the bending of the drives. Raises EquilibriumError where none is found."""
     k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
         found = balances.solve(at)
@@ -172,7 +172,7 @@ def _behind_motors(mechanism: Mechanism, asked: Posture, at: Posture, balances: 
         if np.max(np.abs(away), initial=0.0) <= SETTLED:
             return at
         coordinates = found.motions.mech.to_drive[0, :k, :k] @ away
-        at = _moved(mechanism, at, np.append(coordinates, np.zeros(c - k)))
+        at = _moved(mechanism, at, np.append(coordinates, np.zeros(c - k)))  # the free joints stay
     raise EquilibriumError(
         "no posture was found whose motors stand where they were asked to: the load bends the drives too far; "
         "choose a smaller load"
@@ -181,7 +181,7 @@ def _behind_motors(mechanism: Mechanism, asked: Posture, at: Posture, balances: 
 
 def _ahead_of_bending(mechanism: Mechanism, asked: Posture, at: Posture, balances: _Balances) -> Posture:
     """The links' posture, as if they were rigid, in which their bending has the handle where it is asked for;
-    searched for from `at`."""
+    searched for from `at`. Raises EquilibriumError where none is found."""
     k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
         found = balances.solve(at)
@@ -228,7 +228,10 @@ def _slid(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balances
 
 
 def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
-    """The posture with the drives of `at` and free joints where gravity, their springs and the load leave them."""
+    """The posture with the drives of `at` and free joints where gravity, their springs and the load leave them.
+
+    Raises  EquilibriumError  where none is found, and for a free ball joint that would have to turn
+    """
     k, count = len(mechanism.driven), len(mechanism.free)
     # the same in every posture, so that what is searched for are forces
     scale = balances.scale(at) or 1.0
@@ -239,6 +242,7 @@ def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
         return at
+    # without what tells the links of a joint with several coordinates apart
     names = [mechanism.links.names[i].partition("/")[0] for i in mechanism.free]
     if any(mechanism.links.joint[i] >= BALL_X for i in mechanism.free):
         raise EquilibriumError(
@@ -510,7 +514,7 @@ def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: 
                                                           m: of `moved`, s: of `still`
 
     The second part is of the order of the load's square over the drives' stiffness. So is all that is left of the
-    first where the links' half and the computer's cancel.
+    first where the links' half and the computer's cancel. Without springs in `moved` they stay as they are.
     """
     loaded, held = plants.loaded, moved.squared != 0.0
     if not held.any():
@@ -522,6 +526,7 @@ def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: 
     added = added - sum(np.outer(force.along, force.reading) for force in loaded.sampled_forces)
     if loaded.circulatory is not None:
         added = added + loaded.circulatory
+    # 0.0: without load nothing holds the last of the ways, the free motion
     K = np.diag(np.append(moved.squared[held], 0.0)) + ways.T @ added @ ways
     bordered = np.block([[K, (loaded.actuator @ ways)[:, None]], [loaded.sensor @ ways, 0.0]])
     pushed = np.vstack([ways.T @ added @ still, np.zeros((1, still.shape[1]))])

@@ -264,6 +264,7 @@ class PieceSums:
     def __init__(self, values: int, narrowest: int) -> None:
         """Begin with sums of no block."""
         self._width = narrowest // 2
+        # of whole pieces, an even number
         self._count = (values - 1) // self._width // 2 * 2
         self._blocks = 0
         # columns u R^p for p = 0 to 3, and y; R is -1 to 1 from the piece's beginning to its end
@@ -286,6 +287,7 @@ class PieceSums:
             columns[..., :SUMMED_TERMS] = self._powers
             columns[..., SUMMED_TERMS:-1] = u[some][..., None] * self._powers
             columns[..., -1] = y[some]
+            # the rows below those of C hold G alone
             below = np.asarray(np.linalg.qr(columns, mode="r"))[:, SUMMED_TERMS:, SUMMED_TERMS:]
             self._triangles[some] = _reduced([self._triangles[some], below])
         self._blocks += 1

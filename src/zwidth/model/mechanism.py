@@ -182,7 +182,7 @@ ORIENTATION: Final = 2
 class Links:
     """The n links, parents before children.
 
-    names      (n,)         unique
+    names      (n,)         unique; "link/..." for those that a joint with several coordinates has before its link
     parent     (n,)         index of the parent link, -1 for the base
     joint      (n,)         FIXED, REVOLUTE, PRISMATIC, or BALL_X, BALL_Y and BALL_Z in this order
     origin     (..., n, 3)  joint origin in the parent's frame [m]
@@ -244,7 +244,7 @@ class DriveNonlinearity:
     """Nonlinear parts of the drives, all at the motor; 0, or nan where stated, means that there is none.
 
     coulomb             (..., d)  dry friction between rotor and housing [N m]
-    friction_model      of all of it, as in `nonlinear.Friction`
+    friction_model      of all of it, as in `plant.Friction`
     breakaway           (..., d)  its static level [N m], of lugre; nan: that of `coulomb`
     bristle_stiffness   of dahl and lugre [N m/rad]
     bristle_damping     of lugre [N m s/rad]
@@ -473,8 +473,8 @@ def _friction(n: Floats, nonlinear: DriveNonlinearity, motors: Floats) -> tuple[
 
 
 def _counters(drives: Drives, h: Floats, counted: Floats) -> tuple[Counter, ...]:
-    """Encoder steps of the drives, read by rows counted (d, n) and weighed by h (d,); () where neither a step nor
-    noise is known. A step that is not known is 0: as fine as you like."""
+    """Encoder steps of the drives, read by rows counted (d, n) and weighed by h (d,), those with weight; () where
+    neither a step nor noise is known. A step that is not known is 0: as fine as you like."""
     n, counts = drives.transmission, drives.encoder_counts
     known = np.isfinite(counts)
     noise = np.zeros(len(h)) if drives.nonlinearity is None else drives.nonlinearity.encoder_noise / n

@@ -178,6 +178,7 @@ def _two_sides(
 
     link_mass              (d, d)  mass matrix of the links
     rotor, spring, damper  (d,)    of the drives, at the joints;   H (m, d)  lever arms
+    Raises  ModelError  where rigid drives alone move one of the directions
     """
     m = len(H)
     compliance = (H / spring) @ H.T

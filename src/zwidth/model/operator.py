@@ -74,6 +74,7 @@ def attach(plant: Plant, operator: Operator, across: Floats | None = None) -> Pl
     check_kind("operator", operator, Operator)
     held = _held(plant, operator)
     for motion in () if across is None else across:
+        # arms that were added before do not move along it
         row = np.append(motion, np.zeros(held.size - plant.size))
         beside = _held(replace(held, handle=row), operator)
         # what a force sensor at the handle reads is the force along the rendered direction

@@ -301,7 +301,7 @@ class Plant:
 
     def on_motions(self, motions: Floats) -> Plant:
         """The plant as it moves on some motions alone, the columns of (n, m); their amplitudes are its
-        coordinates."""
+        coordinates, without names. What stands apart is left out."""
         Z = np.asarray(motions)
 
         def both(matrix: Floats | None) -> Floats | None:

@@ -34,8 +34,8 @@ def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
 
     designs  shape of the designs, where their plants are all the same
     Returns  with `drag`, and as coupled also two modes of one frequency or two free motions with damping; nan as
-             input where a plant has to be computed by itself, otherwise: dampers that lag, a loss factor, masses
-             that are not positive
+             input where a plant has to be computed by itself, in another way: dampers that lag, a loss factor,
+             masses that are not positive
     """
     shape = np.broadcast_shapes(design_shape(plant), designs)
     N, n = int(np.prod(shape)), plant.size
@@ -181,7 +181,8 @@ class Postures:
     """N postures and their directions, flat; those that are not OK stand for the first that is.
 
     known    (N,)  which are OK;   design (N,) of each
-    h        (N, c)  lever arms;   mass (N, c, c)  of the links;   side  of the drives, (N, ...)
+    h        (N, c)  lever arms;   mass (N, c, c)  of the links
+    side     of the drives, (N, ...) but for dry friction
     flexible (d,)  marks of the flexible drives
     rotor, spring, damper (N, d)  at the joints;   spun (N, d)  J_m n
     """

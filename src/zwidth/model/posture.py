@@ -306,7 +306,7 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
 
 
 def _one_design(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismArrays, Floats]:
-    """One design packed, and its reference posture (n,) in an assembly; `otherwise` is said of several designs."""
+    """One design packed, and its reference (n,). Raises as `place_of_joints`, for several designs `otherwise`."""
     if mechanism.design_shape:
         raise ValueError(otherwise)
     mech = pack(mechanism)
@@ -325,8 +325,8 @@ def _has_joint_limits(mech: MechanismArrays) -> bool:
 def place_of_joints(
     mechanism: Mechanism, coordinates: Mapping[str, float], assembly: str | None = None
 ) -> tuple[Floats, Floats | None]:
-    """The handle's position (3,) [m] with the driven joints at given coordinates, and its axes (3, 3) where the
-    mechanism controls them: what `solve_posture` takes.
+    """What `solve_posture` takes for driven joints at given coordinates: the handle's position (3,) [m], zeros
+    where drives control its orientation alone, and its axes (3, 3), None where they do not control these.
 
     coordinates  of every driven joint, by the name of its link [rad], of a prismatic one [m]; turns of 2 pi do not
                  count
@@ -358,7 +358,7 @@ def place_of_joints(
 
 
 def joint_position(mechanism: Mechanism, coordinates: Mapping[str, float], assembly: str | None = None) -> Floats:
-    """Handle's position (3,) [m] at coordinates of the driven joints; arguments, errors of `place_of_joints`."""
+    """Position (3,) [m] that `place_of_joints` returns for coordinates of the driven joints, with its errors."""
     return place_of_joints(mechanism, coordinates, assembly)[0]
 
 
@@ -443,7 +443,7 @@ def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
 
 
 def _goals(mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayLike | None) -> Floats:
-    """Goals (..., g) of the handle: position [m], vector of the orientation [rad], or both in this order."""
+    """Goals (..., g): position [m], vector of the orientation [rad], or both in this order. Raises ValueError."""
     if mechanism.controls == POSITION:
         if orientation is not None:
             raise ValueError("the drives do not control the orientation of the handle; leave orientation out")
@@ -462,7 +462,7 @@ def _goals(mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayL
 
 
 def _in_space(mechanism: Mechanism, position: ArrayLike | None) -> Floats:
-    """Positions (..., 3) [m], None: the reference's; two coordinates are completed with the third of that."""
+    """Positions (..., 3) [m], None: the reference's; two coordinates get the third of that. Raises ValueError."""
     if position is None:
         return np.asarray(mechanism.reference_position)
     given = np.asarray(position, dtype=np.float64)
@@ -568,7 +568,7 @@ def _limit_text(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, 
     link = _joint_beyond(mech, angles, goal[None].copy())
     if link < 0:  # the straight way does not lead there
         return "a joint is beyond its limits; ask for a place nearer to the reference, or widen the limits"
-    name = mechanism.links.names[link].partition("/")[0]
+    name = mechanism.links.names[link].partition("/")[0]  # one for all coordinates of a joint
     value, low, high = angles[link], float(mech.lower[0, link]), float(mech.upper[0, link])
     unit = "m" if mech.kind[link] == PRISMATIC else "rad"
     drive = _drive_with_table(mechanism, link)

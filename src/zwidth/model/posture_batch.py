@@ -68,7 +68,8 @@ class PostureBatch:
 
 def solve_batch(mech: MechanismArrays, design: Ints, reference: Floats, goals: Floats) -> PostureBatch:
     """Postures at goals (N, g), each from the start that suits: many of one design by its roadmap, others straight
-    from the reference (P, n) of their design (N,)."""
+    from the reference (P, n) of their design (N,). Where the straight way fails, a single design takes its
+    roadmap, and several start from the postures that the first of them has by its own."""
     designs = len(reference)
     if len(goals) >= ROADMAP_LEAST * designs:
         if designs == 1:
@@ -172,7 +173,7 @@ def _postures(
     last: int,
 ) -> None:
     """Fill the fields of `PostureBatch` of goals (N, g) first to last - 1, one after the other in one working
-    memory.
+    memory: where a posture is not OK all but the status with nan.
 
     starts (S, n), which (N,)  joint coordinates, and the index of those that each goal is followed from
     """

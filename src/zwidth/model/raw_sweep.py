@@ -224,6 +224,7 @@ class _ForceSize:
     def of(cls, force: Floats) -> _ForceSize:
         """The size of the force of one block (n,) [N]."""
         pieces = force[: len(force) // PIECE * PIECE].reshape(-1, PIECE)
+        # of a long block some of them, evenly
         pieces = pieces[:: max(1, len(pieces) // MOST_PIECES)]
         # power of each piece at each frequency, and how many frequencies share it: all alike (sum p)^2 / sum p^2
         power = np.abs(np.fft.rfft(pieces * np.hanning(PIECE), axis=1)) ** 2
@@ -270,6 +271,7 @@ def _hidden_by_steps(
     following = (np.abs(local.value) / gain) ** 2 * local.excited * force.broad
     spectrum = 2.0 * (local.noise / gain**2 + following) / samples
     widths = np.gradient(f)
+    # power of the motion at each frequency and all above it
     above = np.cumsum((spectrum * widths)[::-1])[::-1]
     slower = np.searchsorted(f, f / SLOW)
     other_motion = np.maximum(above[slower] - step**2 / 4.0, 0.0)

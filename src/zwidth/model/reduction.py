@@ -480,6 +480,8 @@ def _reduced_nonlinear(reduced: Plant, plant: Plant, motions: Floats) -> Nonline
 
     A single counter of the whole reading counts the reduced sensor, which is known even where springs tie the
     plant to the ground; there the readings of several counters are not known.
+
+    Raises  ModelError  where they are not
     """
     projected, counters = plant.nonlinear.project(motions), plant.nonlinear.counters
     if len(counters) == 1 and np.array_equal(counters[0].weight * counters[0].along, plant.sensor):
@@ -502,7 +504,10 @@ def _with_handle(reduced: Plant, plant: Plant, motion: Floats) -> Plant:
 
 
 def _with_sensor(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
-    """The reduced plant's sensor: where the wall acts, where the hand is, or what the motions move it by."""
+    """The reduced plant with its sensor: where the wall acts, where the hand is, or what the motions move it by.
+
+    Raises  ModelError  where that is not known, or nothing
+    """
     if np.array_equal(plant.sensor, plant.actuator):
         return reduced
     sensor = project_onto_motions(plant.sensor, motions)
@@ -523,6 +528,8 @@ def _spring(plant: Plant) -> tuple[float, Floats]:
     them.
 
     x = k K^+ (a - h), by the flexible modes; it exists only where a - h does no work on a rigid motion.
+
+    Raises  ModelError  where it does not exist, or k is not positive
     """
     if plant.handle is None:
         raise ModelError("the plant has no handle, so that it has no link side; give `handle`, or use 'rigid'")

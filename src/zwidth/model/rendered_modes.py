@@ -347,7 +347,7 @@ class PolePairs:
     frequency_squared  (N, m)  w^2 [1/s²]; 0 for a free motion
     position, velocity (N, m)  share of each part in the reading [1/kg], [s/kg]; velocity 0 for undamped shapes
     reach              (N,)    the reading that all participations together could have [1/kg], by which rounding is
-                               told; nan for a plant that has to be computed by itself, otherwise
+                               told; nan for a plant that has to be computed by itself, in another way
     """
 
     decay: Floats

@@ -380,7 +380,8 @@ class LowFrequencies:
 
 
 def fit_low_frequencies(frequency: Floats, value: Complexes, deviation: Floats | None) -> LowFrequencies:
-    """Stiffness, damping and mass by linear least squares on P (k + b s + ...) = 1 at the lowest frequencies.
+    """Stiffness, damping and mass by linear least squares on P (k + b s + ...) = 1 at the lowest frequencies:
+    those of the widest of REACHES that fits, or of the narrowest.
 
     frequency  (n,) [Hz], ascending;  value (n,) P
     deviation  (n,) standard deviation of the complex error of P over |P|; None: unknown
@@ -413,6 +414,7 @@ def _fit(f: Floats, P: Complexes, error: Floats) -> tuple[Floats, Floats, Floats
     scale = (2.0 * np.pi * f[-1]) ** np.arange(TERMS)
     equations = P[:, None] * (2j * np.pi * f[:, None]) ** np.arange(TERMS) / scale
     weighted = np.concatenate([equations.real, equations.imag]) / np.tile(error, 2)[:, None]
+    # columns are solved for in units in which they have length 1
     size = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
     wanted = np.concatenate([1.0 / error, np.zeros(len(f))])
     inverse = np.linalg.pinv(weighted / size, rcond=1e-12) / size[:, None]

@@ -110,12 +110,13 @@ def roadmap(mech: MechanismArrays, design: int, reference: Floats) -> Roadmap:
 
 @lru_cache(maxsize=16)
 def _build(contents: _Contents) -> Roadmap:
-    """Flood from the reference, and lay a grid over the goals that finds the nearest node."""
+    """Flood from the reference, and lay a grid over goals of three numbers that finds the nearest node."""
     mech, size = contents.mech, float(contents.mech.size[0])
     turned = min(mech.driven, FLOODED)
     angles, position, rotation = flood(mech, contents.reference, turned, TURNS.get(turned, 1))
     goals = _goals(mech, position, rotation)
     scale = np.ones(goals.shape[1])
+    # of the numbers of an orientation, where there are any
     scale[0 if mech.controls == ORIENTATION else 3 :] = 1.0 if mech.controls == POSITION else size
     from scipy.spatial import cKDTree  # a tenth of a second, which a chart without a map can do without
 
@@ -267,6 +268,8 @@ def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> 
             for sign in (-1, 1):
                 # the cell's number has one digit to the base `turns` for each drive; a turn beyond the last comes
                 # back to 0
+                # of a drive that slides digits above half of `turns` lie backwards: from one half it does not go
+                # on to the other
                 if not revolves and digit == (turns // 2 if sign > 0 else (turns // 2 + 1) % turns):
                     continue
                 cell = cell_of[head] + ((digit + sign) % turns - digit) * place_value

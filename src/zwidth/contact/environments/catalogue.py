@@ -72,7 +72,7 @@ def load_environment(source: str) -> Environment:
     """
     if source in ENVIRONMENTS:
         return ENVIRONMENTS[source]
-    path, colon, name = source.rpartition(":")
+    path, colon, name = source.rpartition(":")  # a path may have a colon, too, as behind a drive's letter
     if not colon or not path.endswith(".py"):
         near = get_close_matches(source, ENVIRONMENTS, n=1)
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(ENVIRONMENTS)}"

@@ -49,8 +49,8 @@ class MechanismMotion(Result):
     torque           (k, d)  as commanded, at the joint [N m]
     kinetic, elastic, gravitational (k,)  energies [J]; the last against the base frame's origin
     hand_work, motor_work, friction_loss (k,)  since the start [J]; motor_work is nan with a lagging actuator
-    status           "done", or why the motion stops: "singular", "loop lost", "diverged", "no force"; reason in
-                     words
+    status           "done", or why the motion stops: "singular", "loop lost", "diverged", "no force", "at a joint
+                     limit"; reason in words
     """
 
     point: OperatingPoint
@@ -207,7 +207,7 @@ class MechanismMotion(Result):
         drives = {
             f"{quantity}_{name}_{unit}": values
             for key, by_name in self._drive_series().items()
-            for quantity, _, unit in [key.partition("_")]
+            for quantity, _, unit in [key.partition("_")]  # the drive's name goes in between
             for name, values in by_name.items()
         }
         return {
@@ -242,7 +242,8 @@ class MechanismMotion(Result):
         }
 
     def __repr__(self) -> str:
-        """Lines with what was simulated, how it ended, where the handle went, and the largest depth and force."""
+        """Lines with what was simulated and how it ended; with samples also where the handle went, and at a
+        surface the largest depth and force."""
         met = "free" if self.surface is None else f"at a {type(self.surface).__name__.lower()}"
         if self.environment is not None:
             met += f" that renders {self.environment.name}"

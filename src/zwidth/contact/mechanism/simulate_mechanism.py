@@ -251,7 +251,8 @@ def _run(
 
 
 def _start_state(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
-    """The first state (N,), from the drives' rates (d,) [rad/s]: joints and motors together, no drive bent."""
+    """The first state (N,), from the drives' rates (d,) [rad/s]: joints and motors together, no drive bent, no
+    lagged torque."""
     d, n = len(system.motor), len(system.damping)
     start = np.zeros(2 * n + len(system.lag_time))
     start[:d], start[n : n + d] = system.mech.to_drive[0] @ posture.angles[mechanism.drives.joint], rates
@@ -281,7 +282,10 @@ def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
 
 
 def _course(system: System, trace: kernel.Trace, reached: int, period: float) -> dict[str, Floats]:
-    """The records of the samples that were reached, by their names in `MechanismMotion`; period  T [s]."""
+    """The records of the samples that were reached, by their names in `MechanismMotion`; period  T [s].
+
+    The work of motors that lag is nan: it is not recorded.
+    """
     d, n, motor, to_joint = len(system.motor), len(system.damping), system.motor, system.mech.to_joint[0]
     state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
     lagging = np.any(system.lag_command >= 0)
@@ -308,7 +312,8 @@ def _course(system: System, trace: kernel.Trace, reached: int, period: float) ->
 
 def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
     """Why a motion with this status ends before its time, after so many seconds; "" where it does not."""
-    if status >= kernel.AT_LIMIT:
+    if status >= kernel.AT_LIMIT:  # plus the number of the link whose joint is at its limit
+        # without what tells the links of a joint with several coordinates apart
         joint = mechanism.links.names[status - kernel.AT_LIMIT].partition("/")[0]
         return f"after {seconds:.6g} s joint {joint!r} is at its limit, beyond which nothing is known of the stop"
     reason = REASONS[status][1]
@@ -347,7 +352,8 @@ def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, s
     at, depth, normal = known[best], depth[best], normal[best]
     plane = handle_motions(posture)  # orthonormal columns
     for _ in range(REACHES):
-        # ways: the normals' parts that the handle can move along; gain: by how much one of them lessens the depth
+        # ways: the normals' parts that the handle can move along; gain: by how much the depth falls along one of
+        # them
         ways = normal @ plane @ plane.T
         gain = np.sum(ways * normal, axis=1)
         reachable = gain > 1e-9  # elsewhere the handle cannot move towards the surface at all

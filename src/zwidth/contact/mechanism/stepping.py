@@ -51,7 +51,8 @@ def turned_far(memory: Memory, x: Floats) -> bool:
 
 @compiled_lean
 def linearise_drives(system: System, memory: Memory, x: Floats) -> None:
-    """Fill A (N, N), the linear part of x' by drives and dampers, at a configured state x (N,)."""
+    """Fill A (N, N), the linear part of x' by drives and dampers, at a configured state x (N,), and `base`, the
+    joint angles there."""
     A, rest, base = memory.linear, memory.rest, memory.base
     motor, spring, B, along = system.motor, system.spring, system.damping, system.lag_along
     n, lags = B.shape[0], system.lag_time.size
@@ -112,7 +113,8 @@ def balanced_norm(A: Floats, n: int) -> float:
 def prepare(system: System, memory: Memory, h: float, part: int) -> None:
     """Fill `memory.half`, `gain` and `mobility` for substeps of length h [s] in one part of the sample.
 
-    A is that of `linearise_drives`, the mass matrix that of the configured state.
+    A is that of `linearise_drives`, the mass matrix that of the configured state. Nothing is filled for a length
+    of 0.
     """
     n, motor, mobility = system.damping.shape[0], system.motor, memory.mobility
     if h <= 0.0:
@@ -200,7 +202,8 @@ def solve_friction(
     """Fill `friction` (d,) with what is held over the substep, from the motors' velocities without it at its end.
 
     stages[0] is F without friction, stages[1] the linear motion that follows. The drives move each other, so their
-    frictions are found in turn until they stay. resting (d,): 1 where a motor ends the substep at rest.
+    frictions are found in turn until they stay. resting (d,): becomes 1 where dry friction has the motor end the
+    substep at rest, else 0.
     """
     mobility, motor, bristles = memory.mobility, system.motor, memory.bristles
     model, numbers = system.friction_model, system.friction

@@ -111,6 +111,7 @@ def packed(surface: Surface | None) -> Floats:
         case Box():
             numbers[KIND] = BOX_HOLLOW if surface.hollow else BOX
             numbers[POINT:SIZES] = _vector("the box's center", surface.center)
+            # of two sizes the third is inf
             half = np.array([*surface.half_sizes, np.inf][:3], dtype=np.float64)
             if half.shape != (3,) or not np.all(half > 0.0):
                 raise ValueError(f"the box's half_sizes must be two or three positive lengths [m], got {half}")
