@@ -120,6 +120,7 @@ def _no_limit(wall_damping: Floats) -> Floats:
 def _unmet(loop: Loop, t: Traits, wall_damping: float) -> frozenset[str]:
     """The assumptions that a loop with traits t does not meet, for walls of one damping B [N s/m]."""
     T = loop.period
+    # of the one mode that the wall moves; else of the free motion, and of the motor side on its spring
     mass, friction = (t.mode_mass, t.mode_damping) if t.has_one_mode else (t.rigid_mass, t.ground_damping)
     sprung_mass, spring = (mass, t.mode_stiffness) if t.has_one_mode else (t.side_mass, t.side_stiffness)
     met = {

@@ -129,7 +129,8 @@ class BoundsComparison(Result):
 
 
 def compare_bounds(point: OperatingPoint, damping: float | None = None) -> BoundsComparison:
-    """Compare every published condition with the exact stability limit at one operating point.
+    """Compare every published condition with the exact stability limit at one operating point; a measured device
+    by the plant that is fitted to it.
 
     damping  at which the conditions are compared [N s/m]; left out: that of the stiffest stable wall, 0 if there
              is none

@@ -129,7 +129,7 @@ def condition(case: ConditionCase) -> Bound:
         "mode_stiffness_N_per_m": traits.mode_stiffness,
         "sampling_period_s": T,
     }
-    known = all(map(isfinite, taken.values()))
+    known = all(map(isfinite, taken.values()))  # else the bound has no limit
     mode = one_mode(traits.mode_mass, traits.mode_damping, traits.mode_stiffness, T) if known else None
     return case.bound(
         name="one mass, spring and damper",

@@ -100,7 +100,8 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The theorem with the numbers of one loop: its own delay, filters and velocity estimate."""
+    """The theorem with the numbers of one loop: its own delay, filters and velocity estimate. No limit where the
+    delay is not whole, or the friction is not known."""
     loop, b = case.loop, case.traits.ground_damping
     known = WHOLE_DELAY not in case.unmet and isfinite(b)
     passive = passive_set(loop, b) if known else None

@@ -77,7 +77,7 @@ def spring_stable(mass: float, device_damping: float, sampling_period: float) ->
 
 
 def condition(case: ConditionCase) -> Bound:
-    """Spring stability with the mass, friction and period of one loop."""
+    """Spring stability with the mass, friction and period of one loop; no limit where one is not known."""
     m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     device = spring_stable(m, b, T) if isfinite(m) and isfinite(b) else None
     return case.bound(

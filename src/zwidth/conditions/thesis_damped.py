@@ -46,7 +46,8 @@ class HeldForceResponse(NamedTuple):
 
 
 def held_force_response(x: ArrayLike) -> HeldForceResponse:
-    """The mass's response to a held force, without cancellation for any x = b T/m >= 0 (...)."""
+    """The mass's response to a held force, without cancellation for any x = b T/m >= 0 (...); below x = 1 `flip`
+    is that of x = 1."""
     x = np.asarray(x, dtype=float)
     tiny = x < 1e-8
     safe = np.where(tiny, 1.0, x)
@@ -110,7 +111,7 @@ def largest(device_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLi
     """Largest stable stiffness over B >= 0, and its damping [N/m], [N s/m], (...).
 
     The tip (4.10), (4.11); from x = 3.659 on the corner of (4.9) with the root z = -1, or B = 0 once that corner
-    is at negative damping.
+    is at negative damping. Arguments as of `stiffness_limit`.
 
     >>> [round(float(v), 6) for v in largest(0.0, 1.0, 1.0)]
     [0.686292, 0.828427]

@@ -53,7 +53,7 @@ def stiffness_limit(
     """
     B, m, T, l = (np.asarray(v, dtype=float) for v in (wall_damping, mass, sampling_period, delay_samples))
     d = B * T / m
-    end = np.pi / (2.0 * (l + 1.0)) + 0.0 * d
+    end = np.pi / (2.0 * (l + 1.0)) + 0.0 * d  # of the shape of d
     inside = (d > 0.0) & (d < 2.0 * np.tan(end / 2.0))
     # along the edge d grows with t, so that its angle is found by bisection
     angle = _bisect(lambda t: edge(t, l)[1] - d, end)
@@ -71,7 +71,7 @@ def largest(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: ArrayLik
     [0.144469, 0.424694]
     """
     m, T, l = (np.asarray(v, dtype=float) for v in (mass, sampling_period, delay_samples))
-    end = np.pi / (2.0 * (l + 1.0)) + 0.0 * m * T
+    end = np.pi / (2.0 * (l + 1.0)) + 0.0 * m * T  # of the shape of all together
     # the cosine's zero at the end is kept finite
     angle = _bisect(lambda t: (l + 1.0) * np.sin(t) * np.sin((l + 1.0) * t) - 2.0 * np.cos((l + 1.0) * t), end)
     p, d = edge(angle, l)

@@ -77,7 +77,7 @@ class Traits:
 
 
 def traits(loop: Loop) -> Traits:
-    """The properties of a loop that decide which conditions apply to it."""
+    """The properties of a loop that decide which conditions apply to it; under load those without it."""
     plant = loop.plant.without_load or loop.plant  # of a load no published condition knows
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor

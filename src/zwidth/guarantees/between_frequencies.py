@@ -65,7 +65,7 @@ class CubicPieces:
         # distances of the five nodes of each window, 1 of each from itself, which the products are to pass over
         apart = nodes[window][:, :, None] - nodes[window][:, None, :] + np.eye(5)
         fifth = np.abs(np.sum(values[:, window] / np.prod(apart, axis=2), axis=2))
-        # the largest of the windows that begin one to four nodes before an interval's left end
+        # the largest of the windows that begin at an interval's left end or up to three nodes before
         first = np.arange(len(nodes) - 1)[:, None] - np.arange(4)
         fifth = fifth[:, np.clip(first, 0, len(window) - 1)].max(axis=2)
         return cls(nodes, values, fifth, signs < 0.0)
@@ -85,6 +85,7 @@ class CubicPieces:
             [np.prod(np.delete(away, j, 1) / np.delete(x[:, [j]] - x, j, 1), axis=1) for j in range(4)]
         )
         missed = self.fifth[:, i] * np.abs(np.prod(away, axis=1))
+        # the way from angle 0 to the lowest node, behind the mirrored ones; 1 beyond
         near = np.minimum(np.abs(at) / self.nodes[MIRRORED], 1.0)
         missed = missed * np.where(near < 1.0, OUTSIDE, 1.0) * np.where(self.odd[:, None], near, 1.0)
         return np.einsum("jk,mkj->mk", weights, self.values[:, window]), BETWEEN * missed

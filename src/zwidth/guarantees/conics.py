@@ -63,7 +63,8 @@ class Conics:
     limit: Floats
 
     def tips(self, period: float) -> Complexes:
-        """The wall K T + j B that each angle forbids nearest to 0 on the ray to its disk's middle (n,).
+        """The wall K T + j B that each angle forbids nearest to 0 on the ray to its disk's middle (m,); angles
+        that forbid none there are left out.
 
         There H C is real and negative, and mu = |H| (|C| + R).
         """
@@ -93,6 +94,7 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
     left, right, values, wide = panels
     nodes = _panel_nodes()
     limit, below = _towards_zero(left[0] + (right[0] - left[0]) * nodes, values[0], nodes)
+    # extrapolated panels, of an octave each, count as wide: of their functions a and b alone are known
     left = np.append(left[0] - np.log(2.0) * np.arange(len(below), 0, -1), left)
     values, wide = np.concatenate([below, values]), np.append(np.ones(len(below), dtype=bool), wide)
     return _conics_of_panels(left, float(right[-1]), values, wide, limit, PIECES)
@@ -106,6 +108,7 @@ def conics_of_disks(
     disks  the disks at angles (k,), finite
     speed  the velocity estimate w (k,) there
     ends   (n,) ascending angles between which the disks are smooth
+    Raises  ValueError  for a disk of infinite radius
     """
 
     def functions(angles: Floats) -> tuple[Floats, Floats]:
@@ -116,6 +119,7 @@ def conics_of_disks(
     if panels is None:
         raise ValueError("a disk has no finite radius; its walls must be left out before")
     left, right, values, wide = panels
+    # the limit [1, 0 ...], a conic that is 1 for every wall: angle 0 forbids none
     return _conics_of_panels(left, float(right[-1]), values, wide, np.eye(6)[0], 1)
 
 
@@ -128,7 +132,8 @@ def _panels(
     functions: Callable[[Floats], tuple[Floats, Floats]], ends: Floats, degree: int
 ) -> tuple[Floats, Floats, Floats, Flags] | None:
     """Panels of log(angle) that polynomials resolve: their ends (n,), (n,), the functions at their points
-    (n, 10, POINTS), and whether they are wide (n,); None where a function is not finite.
+    (n, 10, POINTS), and whether they are wide (n,); None where a function is not finite. Panels of HALVINGS, or of
+    a round in which more than MOST times the first ones are left, are taken as they are.
 
     functions  of angles (k,): the ten functions (10, k) and the errors that they are allowed
     degree     of the Chebyshev polynomials from which on nothing may be left
@@ -169,7 +174,7 @@ def panel_ends(loop: Loop, held_port: Port) -> Floats:
     """Ascending ends of the first panels, from the lowest angle to pi.
 
     Panels grow geometrically away from zero and from each singularity: by powers of two of its distance from the
-    circle, as far as half the way to zero.
+    circle, as far as half the way to zero and 0.3 rad at most.
     """
     poles = np.abs(held_port.poles) * loop.period
     lowest = min(LOWEST, BELOW * float(np.min(poles[poles > SLOWEST], initial=1.0)))

@@ -191,7 +191,8 @@ def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
 
 
 def softest_limit(demand: CouplingDemand, wall_stiffness: float, wall_damping: float, period: float) -> Coupling:
-    """The stiffest coupling through which one wall is stable with every passive operator.
+    """The stiffest coupling through which one wall is stable with every passive operator: inf where it needs none,
+    0 where none suffices.
 
     Wall Z_w = B + K T z/(z - 1) and coupling in series must stay clear of the disk that the device shows,
 

@@ -103,6 +103,7 @@ class Aliases:
         theta = np.asarray(angles, dtype=float)
         k = np.arange(-self.near, self.near + 1)
         direct, swing = _alias_terms(self.loop, self.held_port, theta[:, None] / (2.0 * np.pi) + k)
+        # p, q of the frequency itself, k = 0; c, r of all others together
         p, q, others = direct[:, self.near], swing[:, self.near], k != 0
         at = theta / np.pi
         delay = np.exp(-1j * theta * self.loop.whole_delay)
@@ -127,6 +128,8 @@ def _with_feedforward(
         c' = (c - X conj q)/a,   r' = r/a,   X' = X/a,        a = 1 - 2 Re(c q) + X |q|^2,   X = |c|^2 - r^2
 
     Radius inf where some passive operator makes a part of q vibrate, so that no wall is stable with all of them.
+
+    Raises  ValueError  with feedback other than feedforward
     """
     ahead = loop.controller.feedforward
     if ahead is None or len(loop.controller.fixed_feedback) > 1:

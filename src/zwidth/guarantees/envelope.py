@@ -105,6 +105,7 @@ def touching_points(
     if pair is None:
         return []
     own, beside = pair[0].circle, pair[1].circle
+    # not 0 and pi themselves, where all is real and tells no single wall
     first, last = max(min(first, last), 1e-7), min(max(first, last), np.pi - 1e-7)
     points = []
     for theta in _touching_angles(own, beside, first, last, pieces):
@@ -265,7 +266,11 @@ class EnvelopeCuts:
     def _neighbours(
         self, binding: set[float], shares: Floats, shape: shapely.Geometry, near: float
     ) -> Iterator[tuple[TouchingPoint, TouchingPoint]]:
-        """Pairs of touching points of neighbouring springs that lie on one envelope near `shape`, each once."""
+        """Pairs of touching points of neighbouring springs that lie on one envelope near `shape`, each once.
+
+        binding, shares  of springs: those whose arcs are the edge, and (n,) all that are charted, ascending
+        near             distance from the shape within which touching points count
+        """
         for share in sorted(binding):
             at = int(np.searchsorted(shares, share))
             for touch in self.touching_points[share]:
@@ -274,6 +279,7 @@ class EnvelopeCuts:
                 for place in (at - 1, at + 1):
                     if not 0 <= place < len(shares):
                         continue
+                    # 0 in place of the other end's angle, which is not known before the envelope is followed
                     way = (share, touch.theta, float(shares[place]), 0.0)
                     if way in self.visited_pairs:
                         continue
@@ -286,7 +292,8 @@ class EnvelopeCuts:
                         yield first, last
 
     def _follow_envelope(self, start: TouchingPoint, share: float) -> TouchingPoint:
-        """The envelope's touching point towards another spring: with it, or as near to it as the envelope goes."""
+        """The envelope's touching point towards another spring: with it, or as near to it as the envelope goes;
+        one that is known already in place of the same one."""
         before, now = start, start
         for part in STEPS:
             at = start.share + (share - start.share) * part if part < 1.0 else share
@@ -317,7 +324,7 @@ def _strips_outside_envelope(
 
     They are wide enough for all that the arcs of the two leave. Where the envelope is outside the shape and its
     stable side turned away, strips reach over what is swept: parts whose middle is stable with the springs of
-    their own stretch are left out.
+    their own stretch are left out. size, lost_shares: `envelope_between`.
     """
     gap = other.wall - one.wall
     length = float(np.hypot(*gap))

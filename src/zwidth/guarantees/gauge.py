@@ -51,7 +51,8 @@ class Gauge:
     def largest(self, K: Floats, B: Floats) -> tuple[Floats, Floats]:
         """mu (k,) of walls (k,), and the angle that it comes from, 0 for the limit there.
 
-        Never negative; inf where a wall fails at once. A wall is passive if and only if its mu is below 1.
+        Never negative; inf where a wall fails at once, as all but 0 do without conics. A wall is passive if and
+        only if its mu is below 1.
         """
         if self.conics is None:
             return np.where((K == 0.0) & (B == 0.0), 0.0, np.inf), np.zeros(len(K))
@@ -92,7 +93,8 @@ def _mu(a: float, b: float, D: float) -> float:
 @compiled
 def _conic_at(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[float, float, float, float]:
     """a, b, D and the size |Re H C| + |Im H C| of a wall at the share s of the way through a piece (10, 5) of
-    `Conics`. For narrow disks D is computed as |H|^2 R^2 - Im(H C)^2, since a^2 - b cancels."""
+    `Conics`, whose disks are `wide` or not. For narrow disks D is computed as |H|^2 R^2 - Im(H C)^2, since a^2 - b
+    cancels."""
     KK, KB, BB = K * K, K * B, B * B
     a = across = square = 0.0
     first = B_KK if wide else R_KK  # `square` is b of wide disks, |H|^2 R^2 of narrow ones
@@ -151,6 +153,7 @@ def _largest_within(K: float, B: float, piece: Floats, wide: bool, best: float) 
         best = max(best, _mu(a0, b0, D0), _mu(a1, b1, D1))
         ea, eb = _sags(K, B, piece, s + 0.5 * h, h)
         above = max(_mu_below(a0, b0, D0, ea, eb), _mu_below(a1, b1, D1, ea, eb))
+        # no better one within, or as narrow as the stack allows
         if above <= best + SHARE * best + ROUNDING * size or waiting + 2 > DEPTH:
             continue
         h *= 0.5

@@ -59,7 +59,9 @@ def _guarantees(
     robust: Sequence[Floats] | None = None,
     progress: Progress | None = None,
 ) -> Guarantees:
-    """Every guarantee of a loop as far as its premises allow; the first that fails is why others are withheld."""
+    """Every guarantee of a loop as far as its premises allow; the first that fails is why others are withheld: all
+    but `robust`, and `stable`, which is withheld only where links bend under load. Premises that are not known
+    become warnings."""
     moving = _without_idle_motions(loop)
     guarantees = list[Guarantee]()
     failing = next((each for each in premises if each.fails), None)

@@ -78,8 +78,8 @@ def _measured_samples(port: MeasuredPort, name: str) -> Complexes:
 
 
 def _alias_sums(port: MeasuredPort) -> tuple[Complexes, Floats]:
-    """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; inf where they take in no
-    power.
+    """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; the second inf at all
+    angles if they take in no power at one of them.
 
     All have the factor W theta of hold and delay. What lies beyond the modes is, without it, smooth in the angle.
     """
@@ -120,11 +120,13 @@ def _softest_spring(disks: Disks) -> float:
 def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
     """The walls that keep clear of every passive operator at a measured handle, which `loop` charts; empty, with
     the reason, where the measurement does not tell them."""
+    # below half the sampling rate, and with a finite error in every path
     inner = port.theta < np.pi * (1.0 - 1e-9)
     for source in set(port.origin.values()):
         inner &= np.isfinite(port.deviations[source])
     force = force_filter(loop.controller)
     z, d = np.exp(1j * port.theta), np.expm1(1j * port.theta)
+    # software's delay, whole samples but for rounding
     passed = factor_response(force.numerator, force.denominator, d) * z ** -round(loop.controller.delay)
     disks, hidden = measured_disks(port, np.asarray(passed))
     frequency = port.theta / (2.0 * np.pi * port.period)

@@ -143,7 +143,10 @@ def _outline(loop_gauge: Gauge, period: float) -> tuple[Floats, Complexes]:
 
 
 def _missed_directions(loop_gauge: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
-    """Directions in which an angle forbids walls inside the outline's chords, where they lie deepest inside."""
+    """Directions in which an angle forbids walls inside the outline's chords, where they lie deepest inside.
+
+    directions, ends  (k,) of the outline so far, as of `_outline`
+    """
     if loop_gauge.conics is None:
         return np.zeros(0)
     tip = loop_gauge.conics.tips(period)
@@ -153,6 +156,7 @@ def _missed_directions(loop_gauge: Gauge, directions: Floats, ends: Complexes, p
     depth = np.imag(along.conj() * (tip - first)) / np.maximum(np.abs(along), 1e-300) / np.abs(tip)
     deep = (depth > OUTSIDE) & (directions[right] - directions[right - 1] > NARROW)
     depth = np.where(deep, depth, 0.0)
+    # of a run of tips, the deepest
     farthest = deep & (depth >= np.append(0.0, depth[:-1])) & (depth > np.append(depth[1:], 0.0))
     return np.unique(np.angle(tip[farthest]))
 

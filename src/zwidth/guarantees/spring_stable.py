@@ -70,7 +70,8 @@ def nyquist_spring(loop: Loop) -> float:
 
 
 def nyquist_region(loop: Loop) -> Region:
-    """The walls that are stable with the Nyquist spring alone; empty, with a reason, where there is none."""
+    """The walls that are stable with the Nyquist spring alone; empty, with a reason, where there is none, where
+    the device by itself is unstable, or where nothing damps the mode."""
     if (alone := stable_alone(loop)).fails:
         return empty_region(alone.reason)
     k = nyquist_spring(loop)
@@ -79,9 +80,9 @@ def nyquist_region(loop: Loop) -> Region:
     springs = SpringFamily.of(Loop(without_idle_motions(loop.plant), loop.controller))
     share, *beside = springs.shares(k * np.array([1.0, 0.9, 1.1])).tolist()
     # size of the open loop's characteristic polynomial at z = -1, with the Nyquist spring and one to either side
-    poles = [abs(float(t.line("minus")[0])) for one in (share, *beside) if (t := springs.tracer(one)) is not None]
+    sizes = [abs(float(t.line("minus")[0])) for one in (share, *beside) if (t := springs.tracer(one)) is not None]
     # a double root at -1 that takes long to chart: the polynomial there is as the square of the root's distance
-    if poles and poles[0] < DOUBLE**2 * max(poles):
+    if sizes and sizes[0] < DOUBLE**2 * max(sizes):
         return empty_region(UNDAMPED)
     member = springs.member(share)
     rings = () if member is None else polygon_rings(member_polygons(member, springs.unit))
@@ -99,7 +100,8 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
     their neighbours' sweep is cut off, until none fails. The edge is known to about 1e-5 of the set's size, with
     light modes to 5e-5; where springs fail to the last the region has a warning.
 
-    progress  called with "springs", the rounds that are done, and the most that there can be; fewer are usual
+    progress  called with "springs at the handle", the rounds that are done, and the most that there can be; fewer
+              are usual
     Raises    ValueError  if the plant has no handle
               ChartError  if the chart of one of the springs cannot be closed
 
@@ -213,7 +215,8 @@ def _coarse_first(shares: Floats) -> Floats:
 
 def _common_shape(springs: SpringFamily, new: Floats, members: dict[float, Member]) -> shapely.Geometry:
     """The walls [K unit, B] inside the charts of all `members`, by share, and of springs of `new` shares (n,),
-    which join the members."""
+    which join the members until no wall is left; a spring with which every wall is stable does not join, nor one
+    whose chart is lost in rounding."""
     unit = springs.unit
     left = None if not members else shapely.intersection_all([member_polygons(m, unit) for m in members.values()])
     for share in new.tolist():
@@ -246,7 +249,7 @@ def _cells_and_failing(
     springs: SpringFamily, left: shapely.Geometry, tried: Floats, late: bool
 ) -> tuple[shapely.MultiPolygon, Floats]:
     """Cells of a shape, without crumbs, and shares (n,) of the springs `tried` that make walls of theirs unstable:
-    the worst of each run of neighbours, none if all are stable.
+    the worst of each run of neighbours, at most JOINING, none if all are stable.
 
     Walls just inside the edge of a cell and one in its middle stand for it. If it is late, cells of which none is
     stable with every spring tried are left out; before, all of the edge may be what a few springs cut off.

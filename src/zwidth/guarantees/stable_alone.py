@@ -72,7 +72,8 @@ def bent_as_loaded(omission: str) -> Premise:
 
 
 def stable_alone(loop: Loop) -> Premise:
-    """Whether a loop grows without a wall; an operator attached to its plant counts as a part of the device.
+    """The premise that a loop does not grow without a wall; an operator attached to its plant counts as a part of
+    the device.
 
     Motions that no wall moves count too, but those that stand apart under a load (`Plant.apart`).
     """

@@ -106,8 +106,8 @@ def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand:
 def _demand(
     angles: Floats, fixed: Complexes, swing: Complexes, need: Floats, resistance: Floats
 ) -> CouplingDemand:
-    """The demand of a device that shows the admittance `fixed` where it is held fixed, and up to the swing more or
-    less; inf where it dissipates nothing at the handle. All (k,).
+    """The demand of a device that shows the admittance `fixed` where it is held fixed, and otherwise the disk
+    round `fixed` - `swing` that goes through `fixed`; inf where it dissipates nothing at the handle. All (k,).
 
     need        least Re(1/Z_c) by the condition [m/(N s)];   resistance  Re h11 [N s/m]
     """

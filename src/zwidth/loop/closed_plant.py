@@ -86,8 +86,8 @@ def closed_form(states: PlantStates, controller: Controller) -> SampledForm:
 
 
 def path_responses(plant: Plant, controller: Controller, d: Complexes) -> tuple[Complexes, Complexes]:
-    """Responses (...) of the reading, and of the measured force without a hand, to a command in front of the force
-    filter, nothing closed but the local loop, at z = 1 + d (...)."""
+    """Responses (...) of the reading, and of the measured force without a hand, 0 without a sensor, to a command
+    in front of the force filter, at z = 1 + d (...): nothing closed but the local loop, and what a load adds."""
     sensor = controller.force_sensor
     rows = None if sensor is None else measured_force(plant, sensor)
     states = plant_states(plant, controller.sampling_period, rows, controller.force_filter)
@@ -263,7 +263,8 @@ class _Period:
         measured = self._measured_force() if self.measures else None
         if measured is not None:
             self.measured = measured[: self.rows.size].copy()
-        # of each force of a load: (what acts now, what acts after the delay's part of a sample)
+        # of each force of a load: (what acts now, what acts after the delay's part of a sample); read before any
+        # command of this period acts
         of_loads = [load.read(self.rows.current(self.at)) for load in self.loads]
         slow, later = self.slow.push(self.command.of(wall, reading, measured))
         fast = fast_later = np.zeros_like(wall)
@@ -325,8 +326,8 @@ class _Period:
         return np.asarray(command)
 
     def _advance(self, time: float, commands: Floats) -> None:
-        """Let the plant move for a time [s] under held commands (1 + r, N + 1), the wall's and r of a load, a row
-        each."""
+        """Let the plant move for a time [s] under held commands (1 + r, N + 1), a row each: that of wall and local
+        loop together, and r of a load."""
         lag, rows = self.controller.actuator_time_constant, self.rows
         growth, lagged, pushed = self._growth(time)
         states, forces = rows.current(self.at), rows.current(self.force_at)
@@ -388,12 +389,14 @@ def closed_sections(plant: Plant, controller: Controller) -> ClosedSections:
 
     Raises  UnmovedError      where the wall moves nothing that the sensor reads
             UnresolvedError   where it moves so little of it that rounding hides it
-            ModelError  for a force sensor where none can be
+            ModelError        for a force sensor where none can be
+            HysteresisError   for a plant with a loss factor
     """
     check_no_loss_factor(plant)
     form, states = close_plant(plant, controller)
     if not len(states.output) or not np.any(states.output):
         raise UnmovedError("the wall force moves nothing that the sensor reads; check actuator and sensor")
+    # from a command behind the force filter to the reading, the local loop closed: the whole keeps its zeros
     path = closed_form(states, replace(controller, force_sensor=None, feedforward=None, force_filter=None))
     known = _known_zeros(controller, len(form.output) - len(path.output))
     roots, error = pole_zero_form(form, zero_poles(states, controller), path, known)
@@ -423,7 +426,7 @@ def zero_poles(states: PlantStates, controller: Controller) -> int:
     of_plant = sum((mode.squared == 0.0) * (1 + (mode.decay == 0.0)) for mode in states.modes)
     if states.form is not None:
         of_plant += int(np.count_nonzero(states.form.poles == 0.0))
-    if states.sampled:
+    if states.sampled:  # under load other motions are free: those that its forces leave so
         of_plant = states.neutral
     kept = [of_plant]
     for feedback in controller.fixed_feedback:

@@ -215,9 +215,10 @@ def feedback_name(feedback: FixedFeedback) -> str:
 
 
 def describe_feedback(feedback: FixedFeedback, moments: bool = False) -> str:
-    """A feedback in words, with the numbers that are not 0; several designs' numbers as "several".
+    """A feedback in words: a force sensor with its gain, another one with its gains that are not 0; those of
+    several designs as "several". Filters and delays are left out.
 
-    moments  whether moments about an axis are rendered, so that its numbers are in N m/rad, N m s/rad and kg m²
+    moments  whether moments about an axis are rendered, so that numbers are in N m/rad, N m s/rad, kg m² and N m
     """
     stiffness, damping, mass, force = UNITS_ABOUT_AN_AXIS if moments else UNITS_ALONG_A_DIRECTION
     match feedback:
@@ -330,7 +331,8 @@ class Controller:
     local_loop: LocalLoop | None = None
 
     def __post_init__(self) -> None:
-        """Raise ValueError for a number out of range, TypeError for an estimate or part of another type."""
+        """Raise ValueError for a number out of range or a cutoff that is too high, TypeError for an estimate or
+        part of another type."""
         T = self.sampling_period
         check_fields(self, RANGES if isinstance(T, NotKnown) else PERIOD | RANGES)
         if not isinstance(self.velocity, VelocityMethod):

@@ -33,6 +33,7 @@ def rows_response(rows: Floats, split: bool, z: Complexes, z_minus_1: Complexes 
     z_minus_1  (...)   z - 1, where it is known to more digits than the difference has
     """
     d = z - 1.0 if z_minus_1 is None else z_minus_1
+    # over: 1 / (the denominators by which a row is divided, its own and those of the chain before it)
     out, over = np.zeros_like(d), np.ones_like(d)
     for d1, d0, n2, n1, n0, o2, o1, o0, chained in rows:
         quadratic = (d + d1) * d + d0

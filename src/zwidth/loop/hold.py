@@ -27,10 +27,11 @@ def step_response(decay: float, squared: float, time: float) -> tuple[float, flo
 
         g(t) = t^2 exp[0, s1 t, s2 t],    g'(t) = t exp[s1 t, s2 t]       (divided differences of exp)
 
-    with s1, s2 the roots of s^2 + 2 a s + w^2. Near 0 the power series of the divided difference is summed, which
-    covers rigid, undamped and critically damped modes without cases; elsewhere the closed forms hold.
+    with s1, s2 the roots of s^2 + 2 a s + w^2. Near 0 the power series of g's divided difference is summed, which
+    covers rigid, undamped and critically damped modes without cases; elsewhere, and for g', the closed forms hold.
     """
-    # of s1 t and s2 t: their sum, product and mean, and minus the square of half their difference
+    # of s1 t and s2 t: their sum, product and mean, and minus the square of half their difference; `velocity` and
+    # `position` are g'/t and g/t^2 until the end
     total, product = -2.0 * decay * time, squared * time * time
     mean, gap = -decay * time, (squared - decay * decay) * time * time
     if gap > 0.0:
@@ -80,7 +81,7 @@ def denominator(decay: float, squared: float, period: float) -> tuple[float, flo
     gap = squared - a * a
     if gap > 0.0:
         swing = sqrt(gap) * T
-        # exp(s T) - 1 without cancellation: expm1(a) cos(b) - 2 sin(b/2)^2 is the real part
+        # exp(s T) - 1 without cancellation, s T = x + i b: expm1(x) cos(b) - 2 sin(b/2)^2 is the real part
         real = expm1(-a * T) * cos(swing) - 2.0 * sin(swing / 2.0) ** 2
         imag = exp(-a * T) * sin(swing)
         return -2.0 * real, real * real + imag * imag
@@ -263,7 +264,8 @@ def mode_growth(
     decay: float, squared: float, rate: float, time: float, lag: float
 ) -> tuple[Floats, Floats, Floats]:
     """A mode on its states [xi, xi'/rate] over a time: growth exp(A t) - 1 (2, 2), and the states (2,) that a unit
-    lagged force without command leaves, and a unit command from rest. rate [1/s] only scales the velocity."""
+    lagged force without command leaves (0 without lag), and a unit command from rest. rate [1/s] only scales the
+    velocity."""
     out = np.empty(6)
     _fill_growth(decay, squared, time, lag, out)
     g, dg = out[:2]

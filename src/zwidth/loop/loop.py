@@ -78,7 +78,8 @@ class Loop:
 
         sampling_period  T [s];   delay  from reading to force [samples], any real >= 0
         Raises  TypeError   for anything but a plant and a controller, or for neither a controller nor a period
-                ValueError  for a plant that holds nan, a controller beside a period or delay, numbers out of range
+                ValueError  for a plant that holds nan, a controller beside a period or delay, numbers out of
+                            range, a period that is not known, an inertia that is given as a share
         """
         check_kind("plant", plant, Plant, _HINTS.get(type(plant).__name__, ""))
         if controller is None:

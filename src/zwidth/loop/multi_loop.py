@@ -338,7 +338,7 @@ AT_ONE: Final = 1e-5
 
 def unheld_positions(loop: Loop | MultiLoop) -> int:
     """How many roots z = 1 of walls without stiffness belong to positions that nobody holds; 0 with a spring to
-    the ground, of the device, its operator, or a local loop."""
+    the ground, of the device, its operator, or a local loop, and under load."""
     if isinstance(loop, MultiLoop):
         return _unheld_of_several(loop)
     if "unheld" not in loop.results:
@@ -359,7 +359,7 @@ def set_aside(roots: Complexes, count: int) -> Complexes:
 
 
 def _unheld_of_one(loop: Loop) -> int:
-    """`unheld_positions` of one direction: a free motion that its force moves and its sensor reads."""
+    """`unheld_positions` of one direction: those of free motions that its force moves and its sensor reads."""
     plant, local = loop.plant, loop.controller.local_loop
     if plant.is_loaded or (local is not None and local.stiffness):
         return 0
@@ -509,6 +509,7 @@ def _equal_poles(
     period, decay = sampling[0], drag / 2.0
     left, strength, right = np.linalg.svd(outputs @ inputs)
     level = total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)  # 1e-9: no damping
+    # k modes make at most k singular values; the rest are rounding
     rank = int(np.sum(strength[: len(inputs)] * _reach(squared, drag, *sampling) > level))
     root = np.sqrt(strength[:rank])
     enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root

@@ -148,7 +148,8 @@ class OperatingPoint(PosedDevice):
 
     def _motions_across(self, plant: Plant) -> Floats:
         """Motions (k, n) of the handle across the rendered direction, of an operator who holds it in every
-        direction in which the full model's handle moves; none of any other."""
+        direction in which the full model's handle moves; none of any other, in a reduced model, about an axis, and
+        with several directions."""
         none = np.zeros((0, plant.size))
         if self.operator is None or self.operator.directions != "all" or self.mechanism is None:
             return none

@@ -180,11 +180,13 @@ def _coupled_states(plant: Plant, period: float, force_rows: Floats | None) -> P
 def _loaded_states(
     plant: Plant, period: float, force_rows: Floats | None, force_filter: LowPass | None
 ) -> PlantStates:
-    """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
-    of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a
-    large plant, as links that bend have. Arguments as of `plant_states`."""
+    """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and of each
+    lagged damper the velocity along it behind its lag [m per period]. What is neutral without load no longer is,
+    and nothing is left out but fast motions of a large plant, as links that bend have. Arguments as of
+    `plant_states`."""
     n, T, lagged_dampers = plant.size, period, plant.lagged_dampers
-    V = np.eye(n)  # a plant on its modes without load keeps what the load adds to the last digit
+    # a plant of unit mass is on its modes without load, and keeps what the load adds to the last digit
+    V = np.eye(n)
     if not np.array_equal(plant.mass, V):
         V = undamped_modes(plant.mass, plant.stiffness)[1]
     K, B = V.T @ plant.stiffness @ V, V.T @ plant.damping @ V
@@ -194,10 +196,11 @@ def _loaded_states(
     A = np.zeros((size, size))
     A[:n, n : 2 * n], A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = np.eye(n) / T, -K * T, -B
     for i, damper in enumerate(lagged_dampers):
-        along, force = V.T @ damper.along, 2 * n + i
-        A[n : 2 * n, force] = -damper.damping * along
-        A[force, n : 2 * n] = along / damper.time_constant
-        A[force, force] = -1.0 / damper.time_constant
+        # its force is -damping times the lagged velocity q, tau q' + q = along . x'
+        along, lagged = V.T @ damper.along, 2 * n + i
+        A[n : 2 * n, lagged] = -damper.damping * along
+        A[lagged, n : 2 * n] = along / damper.time_constant
+        A[lagged, lagged] = -1.0 / damper.time_constant
 
     def column(vector: Floats) -> Floats:
         """Input (size,) of a force along (n,), which changes the velocities [m per period]."""
@@ -235,6 +238,7 @@ def _loaded_states(
     )
     readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
     pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
+    # all dampers without their lag, as slow motions see them
     drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lagged_dampers), np.zeros((n, n)))
     feedback = pushes.T @ readings
     # each mode in its own units, so that the stiff ones do not hide the free ones

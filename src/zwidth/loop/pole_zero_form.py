@@ -108,7 +108,7 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
     pairs, fastest = _pairs(form.poles, period), np.inf
     for i, pair in enumerate(pairs):
         rate = float(np.max(np.abs(pair)))
-        if rate < MUCH_SLOWER * fastest:
+        if rate < MUCH_SLOWER * fastest:  # the first of a group of pairs of about one rate
             if i:
                 fast = invariant_subspace(form, np.concatenate(pairs[:i]))
                 parts = [(direct, _without_subspace(G, *fast)) for direct, G in parts]
@@ -382,7 +382,8 @@ class _Match:
 
     def best(self, poles: list[Complexes], zeros: list[Complexes]) -> tuple[PoleZeroForm, float]:
         """The form of one of the sets of poles and one of the sets of zeros with the least error, and that error;
-        inf where none has conjugates to all its roots. Its gain is the median that matches the response."""
+        inf where none has conjugates to all its roots, or none a finite error. Its gain is the median that matches
+        the response where walls can be edges."""
         none = np.zeros(0, dtype=np.complex128)
         found, least = PoleZeroForm(none, none, 0.0), np.inf
         for some, others in product(map(_conjugate_pairs, poles), map(_conjugate_pairs, zeros)):
@@ -406,8 +407,9 @@ class _Match:
 
 
 def _exact_form(system: _Balanced, zero_poles: int) -> PoleZeroForm | None:
-    """Poles, zeros and gain in decimal arithmetic, as the system's doubles have them; None where roots do not
-    settle."""
+    """Poles, zeros and gain in decimal arithmetic, as the system's doubles have them; None for more than
+    MOST_STATES states, where the numerator is 0, and where roots do not settle or have no conjugates. zero_poles:
+    `pole_zero_form`."""
     if len(system.g) > MOST_STATES:
         return None
     below = characteristic_polynomial(system.E)
@@ -424,8 +426,8 @@ def _exact_form(system: _Balanced, zero_poles: int) -> PoleZeroForm | None:
 
 
 def _exact_roots(p: Polynomial) -> Complexes | None:
-    """Roots in d of a polynomial, None where they do not settle; those at z = 0, d = -1, of commands that wait,
-    are divided out first, since equal ones do not settle."""
+    """Roots in d of a polynomial, None where they do not settle, or its coefficients are beyond doubles; those at
+    z = 0, d = -1, of commands that wait, are divided out first, since equal ones do not settle."""
     rest, waiting = without_roots(p, -1)
     companion = np.diag(np.ones(len(rest) - 2), -1) if len(rest) > 1 else np.zeros((0, 0))
     if len(rest) > 1:
@@ -462,7 +464,8 @@ class _Balanced:
         return np.asarray(np.linalg.solve(resolvent, right)[..., 0] @ self.c)
 
     def zeros(self) -> Complexes:
-        """Zeros of the response, all finite eigenvalues of the pencil."""
+        """Zeros of the response, as many as its relative degree leaves: the smallest finite eigenvalues of the
+        pencil, and places far out for zeros that it has not."""
         from scipy.linalg import eigvals
 
         n = len(self.g)
@@ -535,6 +538,7 @@ def _slope(system: _Balanced, at: Complexes, n: int, of_zeros: bool) -> Complexe
     try:
         inverse = np.linalg.inv(resolvent)
     except np.linalg.LinAlgError:
+        # one of them is a pole: each by itself
         if len(at) == 1:
             return np.full(1, complex(np.nan, np.nan))
         return np.concatenate([_slope(system, at[k : k + 1], n, of_zeros) for k in range(len(at))])
@@ -559,7 +563,8 @@ def _conjugate_pairs(roots: Complexes) -> Complexes | None:
 
 
 def _without_common_roots(form: PoleZeroForm) -> PoleZeroForm:
-    """The form without real roots that poles and zeros share to the last digit, as those of delays at z = 0."""
+    """The form without real roots |z| < WELL_INSIDE that poles and zeros share to the last digit, as those of
+    delays at z = 0."""
     poles, zeros = form.poles.tolist(), form.zeros.tolist()
     for zero in form.zeros:
         if zero.imag == 0.0 and abs(1.0 + zero) < WELL_INSIDE and zero in poles:

@@ -117,7 +117,8 @@ class PosedDevice:
     results: dict[Any, Any] = field(init=False, default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
-        """Raise ValueError for arguments that exclude each other, OperatorError for a hand about an axis."""
+        """Raise ValueError for arguments that exclude or do not fit each other, and for encoders of no such name,
+        OperatorError for a hand about an axis."""
         check_choice("encoders", self.encoders, get_args(Encoders))
         kinds = (self.mechanism, self.given_plant, self.response)
         if sum(kind is not None for kind in kinds) != 1:
@@ -217,7 +218,7 @@ class PosedDevice:
 
     def in_model(self, model: Model | None) -> Self:
         """The same device, reduced to another model. Under load the posture is the one that the model has there,
-        whose drives and links bend, or do not.
+        whose drives and links bend, or do not; one that was not sought under the load stays.
 
         Raises  EquilibriumError, LoadError  where a single posture has no equilibrium in that model
         """
@@ -427,7 +428,8 @@ def points_text(shape: tuple[int, ...]) -> str:
 
 
 def point_text(point: OperatingPoint) -> str:
-    """Device, posture, direction, model, operator and computer, as an operating point shows itself."""
+    """Device, posture, direction, model, operator and computer, as an operating point shows itself; of several
+    designs device, shape and operator alone, of several postures their shape in place of posture and direction."""
     name = point.name or "a device"
     held = f", held by {point.operator_name or 'an operator'}" if point.operator is not None else ""
     if point.differing:

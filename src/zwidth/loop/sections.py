@@ -105,7 +105,8 @@ def equal_modes(modes: RealModes) -> list[list[int]]:
 
 def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag: float) -> Sections:
     """Rows of the free motion beside a first-order form, and of the form: a chain in doubles, else one in decimal
-    arithmetic, else one row for each pair of poles, whichever is nearest to the form's response."""
+    arithmetic, else one row for each pair of poles, whichever is nearest to the form's response. Raises
+    UnresolvedError where all are far from it."""
     free_rows = []
     if form.free_residue:
         row = modal_row(0.0, 0.0, period, fraction, lag)
@@ -121,7 +122,7 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
     while m and _repeats(rows[m - 1], rows[: m - 1]):
         m -= 1
     unobserved += ["motion that decays as another one does"] * (len(rows) - m)
-    states = sampled if m == len(rows) else None
+    states = sampled if m == len(rows) else None  # fewer rows do not stand for all states
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
     off = rows_error(chained, sampled)
     if off > KEPT_DIGITS and states is not None:
@@ -165,7 +166,7 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
 
 def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints]:
     """Rows (N, m, 9) of N plants, columns of `Sections.rows`, and how many of each are used (N,): 0 where reach is
-    nan.
+    nan or inf.
 
     controller  the same for all plants, or one of N designs for each
     """
@@ -260,7 +261,8 @@ def plant_rows(plant: Plant, controller: Controller) -> Floats | None:
     """A plant's rows (m, 9): d1, d0, n2, n1, n0, o2, o1, o0 as in `loop.hold`, and 0 since none is chained.
 
     Returns  None for a plant that `sampled_sections` says more about: dampers that couple its modes or lag, a loss
-             factor, a wall force that moves nothing that the sensor reads; and for a large one
+             factor, numbers that are not finite, a wall force that moves nothing that the sensor reads; and for a
+             large one
     """
     if plant.lagged_dampers or plant.hysteresis is not None or plant.size > MOST:
         return None
@@ -271,6 +273,7 @@ def plant_rows(plant: Plant, controller: Controller) -> Floats | None:
         np.array(each, dtype=np.float64)[None]
         for each in (plant.mass, plant.damping, plant.stiffness, plant.actuator, plant.sensor)
     )
+    # the actuator stands in for a handle, which rows do not need
     fill_modes(M, B, K, actuator, sensor, actuator, decay, squared, enter, leave, handle, drag, coupled, 0, 1)
     if coupled[0] or not np.isfinite(numbers).all():
         return None

@@ -114,7 +114,7 @@ class WallMatrices:
         total = self.stiffness + self.damping
         if _is_diagonal(self.stiffness) and _is_diagonal(self.damping):
             moved = np.diag(total) > 0.0
-            # s, v: stiffness and damping of each combination, of which 1 is the sum otherwise
+            # s, v: stiffness and damping of each combination; in the other branch s + v = 1
             S, s, v = np.eye(self.count)[moved], np.diag(self.stiffness)[moved], np.diag(self.damping)[moved]
         else:
             size, axes = np.linalg.eigh(total)

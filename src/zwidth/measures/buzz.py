@@ -37,7 +37,11 @@ BETWEEN_COUNTS = 0.5  # of an encoder's step: the worst place that a constant pu
 def buzz_at(point: OperatingPoint, wanted: WantedWall) -> float:
     """Amplitude of the largest vibration that remains at the wanted wall, over the least one that the hand feels.
 
-    0 where none remains; inf where the device goes on growing to the end of its range.
+    0 where none remains; inf where the device goes on growing to the end of its range. The vibration is looked for
+    about a count and, with encoder steps, midway between two: the larger one counts.
+
+    Raises  MeasureError  where nothing in the device depends on the amplitude
+            NoValueError  with feedback beside the wall law, or under load
     """
     wall = wall_of(wanted)
     try:

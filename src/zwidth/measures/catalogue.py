@@ -438,7 +438,7 @@ def find_measure(name: str, user_measures: Mapping[str, Measure] | None = None) 
     """The measure of a name, from the catalogue or a user's own; the name may end in its unit.
 
     user_measures  measures of a user's own, by name (`user_measures.load_measures`)
-    Raises         ValueError  for an unknown name, with the nearest known one
+    Raises         ValueError  for an unknown name, with the nearest known one;  TypeError  for anything but a text
 
     >>> find_measure("stiffness_max").unit, find_measure("stiffness_max_N_per_m").name
     ('N/m', 'stiffness_max')

@@ -104,6 +104,7 @@ def structural_distortion(plant: Plant, frequency: float) -> float:
     near = poles.imag[:, None] + np.abs(poles.real)[:, None] * ABOUT
     even, slow = np.linspace(0.0, top, TRIED)[1:], np.geomspace(SLOWEST * top, top, TRIED)
     frequencies = np.concatenate([even, slow, near[(near > 0.0) & (near < top)]])
+    # not at the resonances without damping themselves, which here move nothing
     frequencies = np.unique(frequencies[np.isin(frequencies, sharp, invert=True)])
     sizes = np.abs(fixed_plant.deformation(frequencies))
     best = float(sizes.max())
@@ -179,22 +180,22 @@ def _fix_actuator(plant: Plant) -> _FixedActuatorPlant:
     """
     a, h = plant.actuator, handle_of(plant)
     fixed_motions = np.linalg.svd(a[None, :])[2][1:].T
-    rates = np.zeros(0)
+    squared = np.zeros(0)
     if fixed_motions.shape[1]:
-        rates, shapes = undamped_modes(
+        squared, shapes = undamped_modes(
             fixed_motions.T @ plant.mass @ fixed_motions, fixed_motions.T @ plant.stiffness @ fixed_motions
         )
         fixed_motions = fixed_motions @ shapes
     # x_0: with a . x_0 = 1, and no force of the springs along the stiff modes, N^T K x_0 = 0
     start = a / (a @ a)
-    stiff = rates != 0.0
+    stiff = squared != 0.0
     start = start - fixed_motions[:, stiff] @ (
-        (fixed_motions[:, stiff].T @ plant.stiffness @ start) / rates[stiff]
+        (fixed_motions[:, stiff].T @ plant.stiffness @ start) / squared[stiff]
     )
     loss = np.zeros_like(plant.mass) if plant.hysteresis is None else plant.hysteresis
     push = np.stack([fixed_motions.T @ matrix @ start for matrix in (plant.mass, plant.damping, plant.stiffness)])
     return _FixedActuatorPlant(
-        squared_frequencies=rates,
+        squared_frequencies=squared,
         damping=fixed_motions.T @ plant.damping @ fixed_motions,
         loss=fixed_motions.T @ loss @ fixed_motions,
         dampers=tuple(
@@ -255,7 +256,7 @@ def _optimal_mass(point: OperatingPoint, wanted: WantedWall) -> OptimalMass:
     if point.mechanism is None and np.isnan(stiffness):
         if SPRUNG in case.unmet:
             raise MeasureError("needs the stiffness between motors and handle, which the device does not have")
-        stiffness = np.asarray(case.traits.side_stiffness)
+        stiffness = np.asarray(case.traits.side_stiffness)  # of one mass on a spring, which has no two sides
     return optimal_mass(K, B, stiffness, point.controller.sampling_period)
 
 

@@ -143,11 +143,12 @@ def _describe_beam(link: FlexibleLink, mechanism: Mechanism) -> BeamDescription:
 
 
 def joint_coordinates(mechanism: Mechanism, coordinates: Floats) -> dict[str, Any]:
-    """Joint coordinates (n,) by the links that have some: one number, or a list of those of a joint with
+    """Joint coordinates (n,) by their links: one number, 0 of a fixed joint, or a list of those of a joint with
     several."""
     joints: dict[str, Any] = {}
     for name, kind, value in zip(mechanism.links.names, mechanism.links.joint, coordinates.tolist(), strict=True):
-        joint = name.partition("/")[0]  # without what tells the links of a joint with several coordinates apart
+        # a joint with several coordinates has a link for each: "arm/1", "arm/2" ..., the last one "arm"
+        joint = name.partition("/")[0]
         if kind == FIXED:
             joints[joint] = 0.0
         elif joint in joints:
@@ -159,7 +160,7 @@ def joint_coordinates(mechanism: Mechanism, coordinates: Floats) -> dict[str, An
 
 
 def damping_ratios(plant: Plant) -> list[float | None] | None:
-    """Damping ratio a/w of each natural frequency w, a its decay rate; None for rigid ones.
+    """Damping ratio a/w of each natural frequency w, a its decay rate; None for rigid and negatively stiff ones.
 
     Returns None in place of the list where damping couples modes.
 

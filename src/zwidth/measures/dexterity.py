@@ -162,10 +162,10 @@ def handle_mass_isotropy(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms: 
     """
     M, unknown = _without_nan(mass_matrix)
     J = np.where(unknown[..., None, None], np.nan, np.asarray(jacobian, dtype=np.float64))
-    squared, shapes = np.linalg.eigh(M)
-    heavy = squared > 0.0
+    inertias, axes = np.linalg.eigh(M)
+    heavy = inertias > 0.0
     with np.errstate(invalid="ignore"):
-        scaled_jacobian = J @ shapes / np.sqrt(np.where(heavy, squared, 1.0))[..., None, :]
+        scaled_jacobian = J @ axes / np.sqrt(np.where(heavy, inertias, 1.0))[..., None, :]
         ratio = isotropy(scaled_jacobian, freedoms) ** 2
     return np.asarray(np.where(heavy.all(axis=-1) | np.isnan(ratio), ratio, np.inf))
 

@@ -45,7 +45,7 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
     """A measure's values at all points, nan with a status where it has none.
 
     Where the measure's function raises an error at a point, or returns something else than a number, that point
-    has the status FAILED and a note; the others keep their values.
+    has the status FAILED and a note; the others keep their values. Of a function of all points at once all fail.
 
     Raises  MeasureError  where this device does not have the measure at any point
     """
@@ -209,7 +209,8 @@ def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, 
 
 
 def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
-    """Value, status and reason of one call; only a MeasureError is raised.
+    """Value, status and reason of one call; only a MeasureError is raised, also for numbers or a mechanism that
+    the device has not.
 
     Value nan unless the status is OK; reason "" where there is a value, or the result gives none.
     """

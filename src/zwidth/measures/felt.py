@@ -234,6 +234,7 @@ def _computer_responses(controller: Controller, theta: Floats) -> tuple[Complexe
     """
     z, d = np.exp(1j * theta), np.expm1(1j * theta)
     force, speed = force_filter(controller), velocity_estimator(controller)
+    # software's delay, whole samples but for rounding
     passed = factor_response(force.numerator, force.denominator, d) * z ** -round(controller.delay)
     estimate = factor_response(speed.numerator, speed.denominator, d) * window_response(speed.window, z)
     return np.asarray(passed), np.asarray(estimate)
@@ -267,7 +268,7 @@ def _motion_deviation(
 
 def _stiffness_and_mass(omega: Floats, motion: Complexes, deviation: Floats) -> tuple[float, float]:
     """k [N/m] and m [kg] of  Re S = k - m w^2 + c w^4,  S = 1/motion the dynamic stiffness at low w; nan for what
-    is uncertain by more than UNCERTAIN of it."""
+    is uncertain by more than UNCERTAIN of it, and for both where fewer than FEWEST motions are CLEAR."""
     clear = deviation < CLEAR * np.abs(motion)
     if np.count_nonzero(clear) < FEWEST:
         return np.nan, np.nan
@@ -409,6 +410,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     # least and largest damping, and largest stiffness
     (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)
     computer = chart.loop.controller
+    # K >= 0 as far as the regions reach
     half_plane = shapely.box(0.0, low - 1.0, max(right, 0.0) + 1.0, high + 1.0)
     rings = []
     for region in chart.regions:

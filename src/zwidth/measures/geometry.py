@@ -98,7 +98,8 @@ def bodies(mechanism: Mechanism) -> Ints:
 
 
 def rods_of(mechanism: Mechanism, posture: Posture) -> Rods:
-    """The links as rods; those of no length anywhere are left out, and so are those fixed to the base.
+    """The links as rods, from each joint to what the link carries; those of no length anywhere are left out, and
+    so are links fixed to the base. Ends at one place in all postures have one rod.
 
     Raises  NoAnswerError  where none is left
     """
@@ -144,6 +145,7 @@ def neighbours(mechanism: Mechanism) -> set[tuple[int, int]]:
     """Pairs of bodies that share a joint, smaller index first: a link and what carries it, and two that a closure
     holds together."""
     links, closures, body = mechanism.links, mechanism.closures, bodies(mechanism)
+    # links between the coordinates of a joint with several, named "arm/1"
     virtual = {i for i, name in enumerate(links.names) if "/" in name and i in set(links.parent.tolist())}
     pairs = set[tuple[int, int]]()
 
@@ -180,7 +182,8 @@ def link_distance(
     """Least distance between the middle lines of links that share no joint.
 
     posture  (...)
-    pairs    of bodies, by the index of a link of each; None: all that are no neighbours
+    pairs    of bodies, by the index of a link of each; None: all that are no neighbours, but two on the base where
+             their joints are at one place
     Returns  (...)  [m]; inf where there is no such pair, nan where the posture is not OK
     Raises   NoAnswerError  as `rods_of`
     """
@@ -209,7 +212,8 @@ def link_distance(
 
 
 def largest_distance(mechanism: Mechanism, posture: Posture, axes: Sequence[int] = (0, 1, 2)) -> Floats:
-    """Largest distance of any point of a link from the middle of the base, along some of the base's axes.
+    """Largest distance of any point of a link, or of the base's joints and closures, from the middle of the base,
+    along some of the base's axes.
 
     The middle of the base is that of the box round the joints and closures on it.
 
@@ -244,7 +248,7 @@ def limit_margin(coordinate: ArrayLike, lower: ArrayLike, upper: ArrayLike, turn
     coordinate  (..., n)  q [rad], of sliding joints [m]
     lower, upper  (..., n)  infinite where there is no limit
     turns       (..., n)  whether a whole turn more or less is the same
-    Returns     (..., n)  inf where there is no limit; below 0 beyond one
+    Returns     (..., n)  inf unless there are both limits; below 0 beyond one
 
     >>> limit_margin([0.0, 0.5, 7.0], [-1.0, -1.0, 0.0], [1.0, 1.0, 2.0], True).round(3).tolist()
     [1.0, 0.5, 0.717]
@@ -309,6 +313,7 @@ def _homogeneous(T: Floats, R: Floats) -> Floats:
     t, r, t_back, r_back = sizes  # |T|, |R|, |T'| and |R'| of `reciprocal_condition`
     with np.errstate(divide="ignore", invalid="ignore"):
         L = np.sqrt(t * r_back / (r * t_back))
+    # without translations or rotations there is no such length: they stay as they are
     L = np.where(np.isfinite(L) & (L > 0.0), L, 1.0)
     return np.asarray(
         np.where(unknown[..., None, None], np.nan, np.concatenate([T / L[..., None, None], R], axis=-2))
@@ -394,6 +399,7 @@ def _pairs(mechanism: Mechanism, written: tuple[str, ...] | None) -> list[tuple[
         if len(names) != 2 or names[0] == names[-1]:
             raise MeasureError(f"needs pairs of links in colliding_links, each written as 'A:B', got {text!r}")
         if unknown:
+            # without those between the coordinates of one joint, "arm/1"
             known = ", ".join(name for name in index if "/" not in name)
             raise MeasureError(f"has no link {unknown[0]!r} to check in colliding_links; there are {known}")
         pairs.append((index[names[0]], index[names[1]]))

@@ -207,8 +207,8 @@ def frequencies_in_band(
 
     Spread over the band; and where it changes fast, at the undamped resonances of the handle and at the
     antiresonances between them (the zeros of sum h_k^2/(w_k^2 - w^2), one between any two resonances), beside them
-    by a half and by two widths of the damped peak. And at the roots z of the loop on its wall, whose resonances
-    are -ln|z|/T wide.
+    by a half and by two half-widths, the largest decay of the modes. And at the roots z of the loop on its wall,
+    of half-width -ln|z|/T. What lies outside the band is moved to its ends.
 
     low, high  (n,)    of the band [Hz]
     roots      (n, k)  z; 0 for none
@@ -296,7 +296,7 @@ def felt_stiffness_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -
     refuse = _check_frequencies(point, frequency)
 
     def alone(at: Index) -> float:
-        """Felt stiffness at the point of an index [N/m]."""
+        """Felt stiffness at the point of an index [N/m]. Raises NoValueError where the wall is not stable."""
         refuse(at)
         loop, verdicts = _free_loop(point[at]), judge(point[at].loop, [K[at]], [B[at]])
         if verdicts.verdict[0] != STABLE:
@@ -314,7 +314,7 @@ def felt_stiffness_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -
     _, x = motion.compliances(rows, frequency.ravel()[rows][:, None], K.ravel()[rows], B.ravel()[rows])
     values, states = np.full(radii.size, np.nan), np.full(radii.size, DOUBTFUL, dtype=np.uint8)
     values[rows], states[rows] = (1.0 / x[:, 0]).real, FOUND
-    states[motion.known & (radii > 1.0 + NEAR) & below] = NO_WALL
+    states[motion.known & (radii > 1.0 + NEAR) & below] = NO_WALL  # here: the wanted wall is unstable
     return complete_charts(point, values, states, alone, _not_felt(UNSTABLE))
 
 
@@ -323,7 +323,7 @@ def rate_hardness_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) ->
     K, B = numbers_of(wanted, point.shape, "a wanted wall", "stiffness", "damping")
 
     def alone(at: Index) -> float:
-        """Rate-hardness at the point of an index [N/m]."""
+        """Rate-hardness at the point of an index [N/m]. Raises NoValueError where it has none."""
         loop, verdicts = _free_loop(point[at]), judge(point[at].loop, [K[at]], [B[at]])
         if verdicts.verdict[0] != STABLE:
             raise NoValueError(_not_felt(int(verdicts.verdict[0])))
@@ -348,8 +348,8 @@ def rate_hardness_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) ->
     values[rows] = rate_hardness(
         motion.table, motion.modes, rows, motion.delay, motion.lag, K.ravel()[rows], B.ravel()[rows]
     )
-    states[np.isfinite(values)] = FOUND
-    states[motion.known & (radii > 1.0 + NEAR)] = NO_WALL
+    states[np.isfinite(values)] = FOUND  # nan: `alone` says why
+    states[motion.known & (radii > 1.0 + NEAR)] = NO_WALL  # here: the wanted wall is unstable
     return complete_charts(point, values, states, alone, _not_felt(UNSTABLE))
 
 
@@ -372,14 +372,14 @@ def free_motion_force_at(point: OperatingPoint, wanted: WantedWall | WantedWalls
 
 def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
     """Least ratio over a band of the impedance felt at the stiffest wall of a wanted spectral radius to that felt
-    in free motion."""
+    in free motion; the band ends at HIGHEST of the sampling frequency at most."""
     what = "a band of frequencies and the spectral radius that the wall must not exceed"
     names = "lowest_frequency", "highest_frequency", "spectral_radius"
     low, high, radius = numbers_of(wanted, point.shape, what, *names)
     _check_band(point, low, high)
 
     def alone(at: Index) -> float:
-        """Least impedance ratio at the point of an index."""
+        """Least impedance ratio at the point of an index. Raises NoValueError where no wall decays so fast."""
         loop, peak = _free_loop(point[at]), largest_stiffness(point[at].loop, float(radius[at]))
         if peak is None:
             raise NoValueError(NO_WALL_DECAYS)
@@ -389,6 +389,7 @@ def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
     motion, numbers = HandleMotion.of(point), numbers_of_points(point, STIFFEST, radius)
     if motion is None or numbers is None:
         return complete_pointwise(np.full(point.shape, np.nan), alone, point)
+    # a wall that is found needs the handle's motion, too
     states = np.where(motion.known | (numbers.status == NO_WALL), numbers.status, DOUBTFUL).astype(np.uint8)
     rows = np.flatnonzero((states == FOUND) & (point.status.ravel() == OK))
     K, B = numbers.stiffness[rows], numbers.damping[rows]
@@ -396,7 +397,7 @@ def impedance_ratio_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) 
 
     def ratio(frequency: Floats) -> Floats:
         """Impedance felt at the wall over that in free motion (n, k), at frequencies (n, k) [Hz]."""
-        free, held = motion.compliances(rows, frequency, K, B)
+        free, held = motion.compliances(rows, frequency, K, B)  # motion per force: the ratio is the inverse
         return np.asarray(np.abs(free / held))
 
     values = np.full(states.size, np.nan)

@@ -122,7 +122,8 @@ def scaled_jacobian(jacobian: ArrayLike, largest_velocities: ArrayLike, largest_
 
 
 def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Floats:
-    """Exponent of the length in the factor of each entry (m, n): -1, 0 or 1."""
+    """Exponent of the length in the factor of each entry (m, n): -1, 0 or 1. Raises ValueError for an array that
+    is no matrix, and for rows or columns there are not."""
     if J.ndim < 2:
         raise ValueError(f"a Jacobian is a matrix, got an array of shape {J.shape}")
     for name, indices, count in (("rotations", rotations, J.shape[-2]), ("prismatic", prismatic, J.shape[-1])):
@@ -152,7 +153,8 @@ def _check_single_minimum(J: Floats, power: Floats) -> None:
 
 
 def _first_log_length(J: Floats, power: Floats) -> Floats:
-    """Logarithm of a first length: the one at which two kinds of entries have equal norms."""
+    """Logarithm of a first length: the one at which two kinds of entries have equal norms; 0 where there are no
+    two."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = [
             np.log(np.sqrt(np.sum(np.where(power == k, J, 0.0) ** 2, axis=(-2, -1)))) for k in (-1.0, 0.0, 1.0)

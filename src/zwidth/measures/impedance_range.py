@@ -77,7 +77,7 @@ def stiffness_max_with_margins_at(point: OperatingPoint, wanted: WantedWall | Wa
 def _stiffness_with_margins(
     point: OperatingPoint, stiffness: Floats, damping: Floats, delay: Floats
 ) -> tuple[Floats, NDArray[np.uint8]] | None:
-    """Stiffnesses [N/m] and statuses of all N points; None where compiled code cannot treat any of them.
+    """Stiffnesses [N/m] and statuses of all N points; None where compiled code does not treat such points.
 
     stiffness, damping, delay  (N,)  margins: two shares, and samples
     """
@@ -91,6 +91,7 @@ def _stiffness_with_margins(
             some = np.flatnonzero(counts[rows] == count)
             points = piece if len(some) == len(rows) else piece.flat[some]
             margin = delay[rows[some]]
+            # margins that differ make a computer for each point, in one row
             alike = bool((margin == margin[0]).all())
             points, longer = (points, margin[0]) if alike else (points.flat, margin)
             controller = points.controller
@@ -216,7 +217,7 @@ def stiffness_max_decaying_at(point: OperatingPoint, wanted: WantedWall | Wanted
     (radius,) = numbers_of(wanted, point.shape, what, "spectral_radius")
 
     def alone(at: Index) -> float:
-        """Largest stiffness of decaying walls at the point of an index [N/m]."""
+        """Largest stiffness of decaying walls at the point of an index [N/m]. Raises NoValueError for none."""
         peak = largest_stiffness(point[at].loop, float(radius[at]))
         if peak is None:
             raise NoValueError(NONE_DECAYS)
@@ -311,7 +312,8 @@ def stable_area_closed_form_at(point: OperatingPoint) -> MeasureValues:
 def _closed_form_range(point: OperatingPoint) -> ImpedanceRange:
     """Range in closed form at all points: of a rigid mass, or of the motor side on the structure's spring.
 
-    Raises  MeasureError  for another model, or one that breaks what the closed form assumes
+    Raises  MeasureError  for another model, one that breaks what the closed form assumes, or an operator who moves
+                          with it
     """
     if point.operator is not None and point.model != "motor-mass":
         raise MeasureError("has a closed form for the device alone", [("operator", "none")])

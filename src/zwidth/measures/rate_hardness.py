@@ -68,7 +68,7 @@ def rate_hardness(
         _fill_steepest_rates(loops, rows, *of_modes, delay[rows], lag[rows], lagging, K, B, out, first, last)
 
     in_chunks(several, len(rows))
-    return np.maximum(out, _stiffness_at_rest(some, K))
+    return np.maximum(out, _stiffness_at_rest(some, K))  # which the mean rate comes near after long
 
 
 def _stiffness_at_rest(modes: RenderedModes, K: Floats) -> Floats:
@@ -78,6 +78,7 @@ def _stiffness_at_rest(modes: RenderedModes, K: Floats) -> Floats:
     whole = (
         np.where(still, 1.0, w2)[..., None] * np.eye(w2.shape[1]) + K[:, None, None] * a[..., None] * s[:, None]
     )
+    # without a wall the matrix is singular: felt with 0
     free = K == 0.0
     whole[free] = np.eye(w2.shape[1])
     compliance = np.einsum("nk,nk->n", h, np.linalg.solve(whole, h[..., None])[..., 0])
@@ -145,7 +146,8 @@ def _steepest_rate(
     past: Floats,
     memory: Floats,
 ) -> float:
-    """The steepest mean rate of one device with computer c [N/m], v = 1.
+    """The steepest mean rate of one device with computer c [N/m], v = 1; nan where no free motion moves the
+    handle.
 
     modes  w2, drag, h, a and s, as of `_fill_steepest_rates`, which also has delay, lag and lagging
     A, E, F, work, state, after, queue, past, memory  working memory: the generator, its exponentials over an early
@@ -172,7 +174,9 @@ def _steepest_rate(
         samples = max(samples, min(MOST_SAMPLES, int(PERIODS * 2.0 * np.pi / (slowest * T)) + 1))
     if lag > 0.0:
         fastest = max(fastest, 1.0 / lag)
-    # so many that a quarter of the fastest vibration has FINEST of them, a whole sample no more than FINEST
+    # so many that in a quarter of the fastest vibration there would be FINEST, but no more than FINEST in a
+    # sample,
+    # or in each of the two parts that a delay makes of it
     pieces = min(FINEST, 1 + int(2.0 * FINEST * fastest * T / np.pi))
     _fill_generator(w2, drag, h, a, hh, lag, A)
     early, late = (1.0 - fraction) * T / pieces, fraction * T / pieces
@@ -212,7 +216,8 @@ def _steepest_rate(
 def _fill_generator(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, lag: float, A: Floats) -> None:
     """Fill A with d/dt of the state: x (m), x' (m), the actuator's force and the commanded one, the handle held.
 
-    hh  h.h;   lag  of the actuator [s]; 0: none
+    w2, drag, h, a  as of `_fill_steepest_rates`, of one device;   hh  h.h
+    lag             of the actuator [s]; 0: none, the force is set by the caller
     """
     m = len(w2)
     n = 2 * m + 2

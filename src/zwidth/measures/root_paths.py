@@ -188,6 +188,7 @@ class _PathTracer:
         """Add the eigenvalues (N,) at `end`, given unordered, and steps between while the match is uncertain.
 
         halvings  how often the way to `end` may still be halved
+        Raises    NoAnswerError  where the number of eigenvalues changes
         """
         start, z = self.steps[-1]
         if len(z) != len(unordered):

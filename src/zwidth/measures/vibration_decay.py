@@ -190,7 +190,7 @@ def decay_time_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Me
     def alone(at: Index) -> float:
         """Decay time at the point of an index [s]. Raises NoValueError where vibration does not decay."""
         radius, verdict = radii[at], UNSTABLE
-        if not radius > 1.0 + NEAR:
+        if not radius > 1.0 + NEAR:  # too near to 1 for its digits, or nan: not computed with the others
             verdicts = _verdict_at(point, wanted, at)
             radius, verdict = verdicts.spectral_radius[0], int(verdicts.verdict[0])
         if verdict != STABLE:

@@ -54,9 +54,10 @@ def overall(
     """Average, worst, best and uniformity of a measure over a workspace.
 
     values   (...)  cell by cell, nan where there is none
-    status   (...)  as in `measures.definition`: only OK counts; None: all that are not nan, and those are all
-             reached
-    weights  (...)  area or volume of each cell, broadcasting with the values; None: all alike
+    status   (...)  as in `measures.definition`: only OK counts; None: all that are not nan count, and all cells
+             are reached
+    weights  (...)  area or volume of each cell, broadcasting with the values; None: all alike. A cell of 0 does
+             not count
     better   which values are better: "higher", "lower", or None where that depends on the purpose
     Raises   ValueError  for weights that are negative, infinite or do not fit, and a status that does not
 
@@ -144,7 +145,8 @@ def global_isotropy_index(
 def _cells(
     values: ArrayLike, status: ArrayLike | None, weights: ArrayLike | None
 ) -> tuple[Floats, Floats, Flags, Flags]:
-    """Values and weights of all cells, which cells count, and which have a posture, each (k,)."""
+    """Values and weights of all cells, which cells count, and which have a posture, each (k,). Raises ValueError
+    as `overall`."""
     x = np.asarray(values, dtype=np.float64)
     s = np.full(x.shape, OK, dtype=np.uint8) if status is None else np.asarray(status)
     if s.shape != x.shape:
@@ -178,7 +180,7 @@ def _mean_and_deviation(x: Floats, w: Floats) -> tuple[float, float]:
 
 
 def _uniformity(least: float, largest: float) -> float:
-    """Least over largest value, 1 where all are equal; nan where one is negative."""
+    """Least over largest value, 1 where all are equal; else nan where one is negative."""
     if least == largest:
         return 1.0
     return least / largest if least >= 0.0 else float("nan")

@@ -89,7 +89,8 @@ def low_frequency_delay(estimator: Estimator, period: float) -> float:
 def _factors_and_angles(
     method: VelocityMethod | Estimator, period: float, frequency_Hz: ArrayLike
 ) -> tuple[Estimator, Floats]:
-    """Factors of the estimator, and the angles theta = 2 pi f T (...) of frequencies f (...) [Hz]."""
+    """Factors of the estimator, and the angles theta = 2 pi f T (...) of frequencies f (...) [Hz]. Raises
+    ValueError for one that is negative or above 1/(2T) by more than rounding."""
     estimator = method if isinstance(method, Estimator) else method.estimator(period)
     share = np.asarray(frequency_Hz, dtype=float) * (2.0 * period)
     allowed = (share >= 0.0) & (share <= 1.0 + 1e-12)

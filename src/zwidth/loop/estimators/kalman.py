@@ -34,7 +34,7 @@ class Kalman:
     acceleration_noise  sigma_a, standard deviation of the accelerations to expect [m/s²]
     position_noise      sigma_n, standard deviation of the encoder's error [m]; `Kalman.of_encoder` takes its step
     Raises              ValueError  unless both are positive and finite; from the methods, where Lambda is outside
-                        3e-6 to 1e8
+                        3e-6 to 1e8; arrays of designs are not checked for that
 
     >>> method = Kalman.of_encoder(acceleration_noise=10.0, resolution=1e-5)
     >>> round(method.delay(0.001) * 1e3, 4), round(method.alpha_beta(0.001).alpha, 4)
@@ -71,7 +71,10 @@ class Kalman:
         return self.alpha_beta(period).noise_gain(period)
 
     def _share(self, period: float) -> float:
-        """1 - r, without cancellation: u = 1 - r is the positive root of 2 u^2 + Lambda u - Lambda = 0."""
+        """1 - r, without cancellation: u = 1 - r is the positive root of 2 u^2 + Lambda u - Lambda = 0.
+
+        Raises  ValueError  for an index out of INDEX; not for an array, of several designs
+        """
         check_period(period)
         index = self.acceleration_noise * period**2 / self.position_noise
         low, high = INDEX

@@ -76,6 +76,7 @@ def _best_fit(memory: Floats, newest: int, periods: int, band: float) -> float:
         candidate = 6.0 * (n * total - 2.0 * moment) / (n * (n + 1.0) * (n + 2.0))
         start = memory[newest] + total / (n + 1.0) + 0.5 * n * candidate  # of the line, at the newest reading
         for i in range(n + 1):
+            # two readings lie on their line but for rounding: a window of one period never fails
             if n > 1 and abs(memory[newest - i] - start + candidate * i) > band:
                 return slope
         slope = candidate
@@ -122,6 +123,7 @@ def velocity_of(method: VelocityMethod | Estimator, positions: ArrayLike, period
     period     T [s]
     Returns    (..., N)  [m/s]; the first is 0
     Raises     ValueError  for positions that are no series or not finite, for a period that is not positive
+               TypeError   for a method of another type
 
     >>> from zwidth.loop.estimators import BackwardDifference
     >>> velocity_of(BackwardDifference(), [0.0, 1e-3, 3e-3], 0.001)

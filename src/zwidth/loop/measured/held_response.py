@@ -53,14 +53,15 @@ def held_response(response: Response, operator: Operator, period: float) -> Resp
 
     period  sampling period T [s]
     Raises  ResponseError  where the handle was not measured, see `measured_port`
+            OperatorError  as `hold_port`
     """
     _check_mass(operator)
     return hold_port(response, measured_port(response, period), operator)
 
 
 def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Response:
-    """The response with an operator at the handle, of a device whose port is known already. Raises OperatorError
-    for an arm without mass behind an elastic grasp."""
+    """The response with an operator at the handle, of a device whose port is known already, at the frequencies at
+    which errors leave something of it. Raises OperatorError for an arm without mass behind an elastic grasp."""
     _check_mass(operator)
     D = operator_stiffness(operator, port.theta / port.period)
     beyond = _aliases(port, operator)
@@ -70,7 +71,8 @@ def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Res
     if port.sweeps:
         sweeps = np.array([value - _hand_change(base, D) - beyond for base, value in port.sweeps])
     error = _relative_error(port, D, change, held, beyond)
-    # what a hand leaves of a far larger motion is the difference of two measured ones
+    # what a hand leaves of a far larger motion is the difference of two measured ones; all are kept where fewer
+    # than FEWEST would be left
     kept = (
         error < MOST_ERROR if np.count_nonzero(error < MOST_ERROR) >= FEWEST else np.ones(len(error), dtype=bool)
     )
@@ -95,7 +97,7 @@ def response_of_port(response: Response, port: MeasuredPort, operator: Operator 
     """The response up to half the sampling rate of a port that was changed, see `measured_port.changed_port`, with
     or without an operator.
 
-    response  the measured one, of which its coherence stays
+    response  the measured one, whose coherence stays without an operator
     """
     whole = replace(
         response,
@@ -153,7 +155,8 @@ def _hand_change(base: Mapping[str, Complexes], D: Complexes) -> Complexes:
 
 
 def _aliases(port: MeasuredPort, operator: Operator) -> Complexes:
-    """Sum (n,) of X over the frequencies theta + 2 pi k, k other than 0, of the fitted modes."""
+    """Sum (n,) of X over the frequencies theta + 2 pi k, k other than 0, to FAR on either side, of the fitted
+    modes."""
 
     def change(theta: Floats) -> Complexes:
         """X (...) [m/N] of the fitted modes at angles (...) of any size, in radians per sample."""

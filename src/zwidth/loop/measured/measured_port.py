@@ -73,7 +73,8 @@ class MeasuredPort:
 
     @cached_property
     def misfit(self) -> float:
-        """Root mean square of the relative deviation of fitted from measured responses, in the upper half."""
+        """Root mean square deviation of measured from fitted responses, in shares of the fitted, at angles above
+        pi/2 whose error is finite; inf where there are none."""
         upper = self.theta > 0.5 * np.pi
         squares = []
         for name in self.baseband:
@@ -134,6 +135,7 @@ def measured_port(response: Response, period: float) -> MeasuredPort:
     assert handle is not None
     data = path_data(response, period)
     model = fit_poles(data)
+    # with the actuator at the sensor, paths that were not measured are made of others by hold and delay
     takes_hold_out = handle.actuator_at_sensor and handle.command_to_handle is None
     if takes_hold_out and model.delay_deviation * np.pi > LATEST:
         raise ResponseError(

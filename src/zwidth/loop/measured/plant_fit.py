@@ -112,7 +112,7 @@ class PlantFit(Documented):
 
 
 def fit_plant(response: Response, period: float) -> PlantFit:
-    """The plant of a measured device.
+    """The plant of a measured device; its misfits are those below 0.95 of half the sampling rate.
 
     period  sampling period T [s]
     Raises  ResponseError  where no plant explains the response
@@ -160,6 +160,7 @@ def _first_model(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) 
     poles, delay, residues = found.modes, found.delay, {}
     for name, value in data.values.items():
         own_atoms = mode_atoms(poles, found.free, data.theta, delay if name[1] == "a" else None)
+        # without those times s: a modal model has none
         atoms = stacked(own_atoms[:, : len(poles) + found.free], data.deviations[name])
         scale = np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
         target = stacked(value, data.deviations[name])
@@ -175,7 +176,7 @@ def _first_model(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) 
 
 def _ends_of_modes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tuple[Floats, Floats, Floats]:
     """Actuator, sensor and handle (n,) of n modes whose products explain the residues (n,) of all paths about as
-    well. at_sensor, tied: `_first_model`."""
+    well; where no path tells the handle it is the sensor if tied, else 0. at_sensor, tied: `_first_model`."""
     sa, sh, ha, hh = (residues.get(name) for name in PATHS)
     assert sa is not None
 
@@ -202,13 +203,14 @@ def _ends_of_modes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) 
 
 
 def _fitted(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> ModalModel:
-    """The model whose numbers `_numbers_of_model` fit the data by least squares, begun from `start`: itself where
-    the numbers are more than the data. at_sensor, tied_ends: as `_first_model`'s at_sensor and tied."""
+    """The model whose numbers `_numbers_of_model` fit the data by least squares, begun from `start`: `start`
+    itself where the numbers are more than the data. at_sensor, tied_ends: as `_first_model`'s at_sensor and
+    tied."""
     from scipy.optimize import approx_fprime, least_squares
 
     unpack = partial(_model_of_numbers, data, start, at_sensor, tied_ends)
 
-    def residual(x: Floats) -> Floats:
+    def residual(x: Floats) -> Floats:  # finite, large where the model's response is not: the search turns back
         return np.nan_to_num(_model_residual(data, unpack(x)), nan=1e6, posinf=1e6, neginf=-1e6)
 
     x = _numbers_of_model(data, start, at_sensor, tied_ends)
@@ -235,6 +237,7 @@ def _model_of_numbers(
     rows, columns = np.tril_indices(m)
     springless = start.squared[first:] == 0.0
     squared = np.zeros(n)
+    # clipped, so that no frequency on the way of the search overflows
     squared[first:] = np.where(springless, 0.0, np.exp(np.clip(2.0 * x[:m], -200.0, 20.0)))
     factor = np.zeros((m, m))  # of the damping, which so never gives power
     factor[rows, columns] = x[m : m + len(rows)]
@@ -256,8 +259,9 @@ def _model_of_numbers(
 
 
 def _numbers_of_model(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> Floats:
-    """Return the numbers (q,) of the start that are fitted, per sample: logarithms of the modes' frequencies, the
-    lower triangle of the damping's factor, the sensor, and as far as they are free actuator, handle and delay."""
+    """Return the numbers (q,) of the start that are fitted, per sample: logarithms of the modes' frequencies (0 of
+    one without spring), the lower triangle of the damping's factor, the sensor, and as far as they are free
+    actuator, handle and delay."""
     first = int(start.free)
     rows, columns = np.tril_indices(len(start.squared) - first)
     springless = start.squared[first:] == 0.0

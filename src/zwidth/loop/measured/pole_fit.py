@@ -130,7 +130,7 @@ def fit_poles(data: PathData) -> PoleModel:
 
 def _search(data: PathData) -> tuple[float, float, Floats]:
     """Misfit, delay and modes of the best of searches from several delays, each with a mode more than before until
-    two in a row explain nothing."""
+    two in a row explain nothing, the misfit is EXACT, or there are MOST_MODES."""
     # one pole at z = 1: a mass on a dashpot, whose decay is looked for from ten times the lowest angle
     first = np.array([[0.0, 10.0 * data.theta[0]]]) if data.integrators == 1 else np.zeros((0, 2))
     # all are (misfit, delay, modes)
@@ -234,7 +234,7 @@ def _refine(data: PathData, modes: Floats, delay: float) -> tuple[Floats, float]
     def unpack(x: Floats) -> tuple[Floats, float]:
         """Modes (n, 2) and delay [samples] of the fitted numbers: the modes' logarithms, then a free delay."""
         new = np.exp(x[: 2 * len(modes)].reshape(-1, 2))
-        new[~moving, 0] = 0.0
+        new[~moving, 0] = 0.0  # a mass on a dashpot stays one: its decay alone is fitted
         return new, delay if fixed else float(x[-1])
 
     x0 = np.log(np.where(modes == 0.0, 1.0, modes)).ravel()
