@@ -111,7 +111,7 @@ def assign_all(document: dict[str, Any], settings: Iterable[tuple[str, Any]]) ->
 
 def _set_in_place(document: dict[str, Any], path: str, value: Any) -> None:
     """Set the value at a path of the document, in place; `UNSET` removes it. Missing outer tables are made; keys
-    that exclude the new one, or that a new method does not read, are removed."""
+    that exclude the new one, or that a new method does not read, are removed; a type that the key tells is set."""
     *outer, last = resolve(document, path)
     table: Any = document
     for step in outer:
@@ -320,7 +320,7 @@ def _children(place: Any, part: str) -> list[Any]:
 
 
 def _toml_value(text: str, path: str) -> Any:
-    """The text as a TOML value, `UNSET` for the bare word unset, the text itself if it is no TOML."""
+    """The text as a TOML value, `UNSET` for the bare word unset, else the text itself. Raises DeviceError."""
     if text == "unset":
         return UNSET
     try:
@@ -331,7 +331,7 @@ def _toml_value(text: str, path: str) -> Any:
         return text
     value = document["value"]
     if len(document) > 1:
-        return text
+        return text  # of several lines that read as keys
     if not within_depth([value]):
         raise fail(SETTINGS, path, "is nested too deeply")
     return value

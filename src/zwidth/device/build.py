@@ -277,7 +277,7 @@ def nonlinear_of_plant(
     as_actuator = np.ones(1) if plant.size == 1 else plant.actuator
 
     def along(given: Sequence[float] | None) -> Floats:
-        """The vector (n,) that a table gives, or else the actuator's."""
+        """The vector (n,) that a table gives, or else the actuator's; 1 of a single coordinate."""
         return as_actuator if given is None else np.array(given, dtype=np.float64)
 
     springs = [

@@ -540,6 +540,7 @@ def properties_of(section: BeamSection, length: float) -> BeamProperties:
     if section.section is not None:
         return beam_properties(length, _cross_section(section), _material(section))
     bending = np.broadcast_to(np.asarray(section.bending_stiffness_Nm2, dtype=np.float64), (2,))
+    # all are there: the rules refuse a beam without a section that lacks one
     other_numbers = (
         section.torsion_stiffness_Nm2,
         section.axial_stiffness_N,

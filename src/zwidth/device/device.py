@@ -53,7 +53,7 @@ class Device:
     name, description, source   as in the file
     sources             dotted path -> where that group of numbers comes from
     label               the file or bundled name, for messages
-    mechanism           None for a device given by its plant
+    mechanism           None for a device given by its plant or response
     given_plant         None for a device given by its mechanism or response
     response            the measured response; None for a device given by a model
     controller          sampling, delay, velocity filter
@@ -444,7 +444,8 @@ class Device:
         return rendered.shape[-1] == 6 and not rendered[..., :3].any()
 
     def _posture_under_load(self, posture: Posture, directions: Floats, model: str | None) -> Posture:
-        """The postures (...) that the device has under its load, rendering directions (..., 1, 3 or 6)."""
+        """The postures (...) that the device has under its load, rendering directions (..., 1, 3 or 6); those
+        given where it has none, or renders several directions together."""
         if self.load is None or directions.shape[-2] != 1:
             return posture
         from zwidth.model.effective_mass import screw
@@ -500,7 +501,7 @@ class Device:
         directions: ArrayLike | None,
     ) -> Floats:
         """Unit vectors (..., m, 3), or screws (..., m, 6), of the directions rendered together; m = 1 of a single
-        direction. Arguments as for `at`. Raises DeviceError."""
+        direction. Arguments as for `at`; an array of screws stays as it is. Raises DeviceError."""
         if directions is None:
             return self.direction(direction, axis, characteristic_length)[..., None, :]
         if axis is not None:

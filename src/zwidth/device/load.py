@@ -57,8 +57,8 @@ def document_held_by(
 ) -> dict[str, Any]:
     """The device's document with another operator.
 
-    operator  an Operator; a bundled operator's name, a file with an [operator], "none" for nobody; None: as the
-              document says
+    operator  an Operator; a bundled operator's name, a file with an [operator] or [arm], "none" for nobody; None:
+              as the document says
     Raises DeviceError  with all faults of the operator's file
     """
     if operator is None:
@@ -352,6 +352,7 @@ def build_device(
     """The device of checked sections; their numbers may be arrays over designs (`design_batch`).
 
     surplus  its drives beyond the mechanism's freedom; None: to be found, of one design
+    Raises   DeviceError  for a response that cannot be read or that no operator can hold, and a faulty beam
     """
     section, controller = checked.mechanism, build.controller(checked.loop)
     mechanism = _mechanism(section, document, label, surplus) if section else None

@@ -183,6 +183,7 @@ def _single_moment_faults(mechanism: Mechanism, mech: MechanismArrays, section: 
                 and np.linalg.norm(np.cross(axis[carrier], axis[link])) > PARALLEL
             ):
                 reported.add(member.path)
+                # the link: its joint coordinates are name/1, name/2, ..., name
                 turner = links.names[carrier].partition("/")[0]
                 yield (
                     ("mechanism", *member.path, "inertia_kg_m2"),

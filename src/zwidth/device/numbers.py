@@ -206,6 +206,7 @@ def _value_of_nothing(document: dict[str, Any], steps: KeyPath) -> Iterator[floa
         tried = [default, typical_size(document, steps)]
     if any(not isinstance(one, int | float | str) or isinstance(one, bool) for one in tried):
         return
+    # a free text is no number
     if isinstance(default, str) and not choices:
         return
     try:
@@ -231,9 +232,9 @@ def _choices(document: dict[str, Any], steps: KeyPath) -> tuple[str, ...]:
 def _changes_by_kind(
     document: dict[str, Any], steps: KeyPath, choices: tuple[str, ...]
 ) -> dict[str, dict[str, float | str | None]]:
-    """For each kind of table that a tag at `steps` may name, what changes with it: path -> usual value of a key
-    that it needs, or None for one that it does not read. {} where the key is no tag; a kind that is refused for
-    other reasons is left out."""
+    """For each kind of table that a tag at `steps` may name, what changes with it: path -> value of a key that
+    it reads and another kind does not, the file's or a usual one, or None for one that it does not read. {} where
+    the key is no tag; a kind that is refused for other reasons is left out."""
     tag, keys = schema.kinds(steps[:-1])
     if steps[-1] != tag:
         return {}
@@ -380,7 +381,7 @@ USUAL: Final = {
 
 def number_limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float, float, tuple[str, ...]], bool]:
     """Lowest and highest value that the schema allows, which of the two ("lowest", "highest") are not allowed
-    themselves; and whether the number must be whole."""
+    themselves; and whether the number must be whole. -inf and inf for a key that is no number."""
     kinds = [one for one in schema.subschemas(steps, document) if one.get("type") in ("number", "integer")]
     for kind in kinds:
         at_least, at_most = (_limit(kind, "ge", "minimum"), _limit(kind, "le", "maximum"))

@@ -222,6 +222,7 @@ def _link_faults(mechanism: dict[str, Any], size: float) -> KeyMessages:
                 ("mechanism", *path, "inertia_kg_m2"),
                 f"{inertia:g} kg m² looks wrong for {mass:g} kg, a radius of gyration of "
                 f"{_length_text(gyration)} on a device of {_length_text(size)}; "
+                # the mass as its own hint corrects it
                 f"{_inertia_hint(inertia, mass / 1e3 if too_heavy else mass, size)}",
             )
 
@@ -368,7 +369,7 @@ def _beam_number_faults(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
 
 def _mode_faults(device: Device) -> dict[str, tuple[KeyPath, str]]:
     """Of beams whose first, or highest kept, mode is too fast for the loop: link name -> key below [beam], () for
-    the whole, and sentence."""
+    the whole, and sentence; {} where no link bends, or the sampling period is not known."""
     mechanism, period = device.mechanism, device.controller.sampling_period
     if mechanism is None or not mechanism.flexible or isinstance(period, NotKnown):
         return {}
@@ -394,7 +395,7 @@ def _mode_faults(device: Device) -> dict[str, tuple[KeyPath, str]]:
 
 def _first_frequencies(device: Device) -> dict[int, float]:
     """Link index -> first frequency [Hz] at which its beam bends alone, the other links rigid and the motors held,
-    at the reference; {} where that is no posture."""
+    at the reference; {} where that is no posture, or masses are not known."""
     from zwidth.errors import PostureError
     from zwidth.model.mechanism_arrays import pack
     from zwidth.model.motions import Motions

@@ -46,7 +46,7 @@ def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = Fals
 
 
 def read_head(path: str | os.PathLike[str], most: int, *, pipes: bool = False) -> bytes:
-    """The first bytes of a plain file, at most so many; as `read_plain`, but for its size."""
+    """The first bytes of a plain file, at most so many; as `read_plain`, but for its size. Raises FileError."""
     try:
         if wrong := _not_plain_message(os.stat(path).st_mode, pipes):
             raise FileError(wrong)
@@ -260,7 +260,8 @@ def device_text(label: str) -> str:
 
 
 def parse_document(text: str, label: str, shelf: BundledFiles = DEVICES) -> dict[str, Any]:
-    """The document a TOML text holds; never empty, never nested beyond reason, never of a newer version."""
+    """The document a TOML text holds; never empty, never nested beyond reason, never of a newer version.
+    Raises DeviceError for any other text."""
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

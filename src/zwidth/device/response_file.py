@@ -221,7 +221,8 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
 
 
 def _check_spectrum(path: Path, table: Table, period: float) -> None:
-    """Raise DeviceError for frequencies that do not rise up to half the rate, and for a coherence out of range."""
+    """Raise DeviceError for frequencies that do not rise up to half the rate, a coherence out of range, or fewer
+    than six frequencies."""
     frequency, lines = table["frequency_Hz"], table[LINE].astype(int)
     nyquist = 0.5 / period
     low, twice, falling = frequency <= 0.0, np.diff(frequency) == 0.0, np.diff(frequency) < 0.0
@@ -233,7 +234,7 @@ def _check_spectrum(path: Path, table: Table, period: float) -> None:
             (np.flatnonzero(twice) + 1, "{:.10g} is there twice; keep one of them"),
             (np.flatnonzero(falling) + 1, "{:.10g} follows {:.10g}; sort the lines by rising frequency"),
             (
-                above[:1],
+                above[:1],  # all behind it are above, too
                 f"{{:.10g}} is above half the sampling rate, {nyquist:.10g}; leave it out, or correct "
                 "sampling_period_s",
             ),

@@ -145,7 +145,7 @@ def _number_demand(kind: str, limits: Mapping[str, Any], got: object) -> str:
     got     what came instead
     """
     match kind:
-        case "float_type" if isinstance(got, int) and not isinstance(got, bool):
+        case "float_type" if isinstance(got, int) and not isinstance(got, bool):  # larger than any float
             return "must be a finite number"
         case "float_type":
             return "must be a number"

@@ -63,7 +63,7 @@ class Identification(Result):
     checks       in the order in which they were made
     estimates    the numbers; () where a check refuses the data
     validation   share of the unseen part's motion (or torque) that is explained: 1 minus the residual's variance
-                 over the signal's; nan where nothing was fitted
+                 over the signal's; nan where nothing was fitted, or nothing was left to predict
     validated_on what the unseen part was, and how it was predicted, a sentence
     remarks      sentences about what was seen beside the numbers
     curves       columns of what was measured and fitted, for figures and .csv, by kind

@@ -93,6 +93,7 @@ def fit_least_squares(
     effective_count  number of independent residuals where they are fewer than n, as of overlapping segments
     diff_step        relative step of the derivatives, for residuals that are not exact to rounding; None: 1.5e-8
     tolerance        relative change of the sum of squares at which the search ends
+    level            probability with which an interval holds its parameter
     profiled         False: intervals by the curvature alone, q sigma_i
     rivals           further places (p,) where the search begins. Where the sum of squares has several minima, the
                      least is the fit, and all whose rise is below that of an interval's end widen the interval
@@ -237,7 +238,7 @@ class _EndSearch:
 
     def end(self, i: int, guess: float) -> float:
         """The end of parameter i's interval on the side of a guess; -inf, inf where there is none within its
-        bounds or FARTHEST widths.
+        bounds or FARTHEST widths, or the guess is infinite.
 
         The others follow along the valley from the last place within: where a step goes so far that they lose it,
         a shorter one is made, and the end is looked for from within.

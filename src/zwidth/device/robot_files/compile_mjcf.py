@@ -136,6 +136,7 @@ def _refuse_mesh_masses(mujoco: Any, spec: Any, label: str) -> None:
             for geom in body.geoms
             if _is_mesh(mujoco, geom) and (geom.density > 0.0 or geom.mass > 0.0)
         ]
+        # where a shape of the body has the mass 0, its meshes are taken to be for the looks
         if meshes and all(np.isnan(geom.mass) or geom.mass > 0.0 for geom in body.geoms):
             faults.append(
                 Fault(
@@ -161,7 +162,8 @@ def _moving_bodies(spec: Any) -> Iterator[Any]:
 
 
 def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
-    """Replace meshes by small spheres and remove materials of a model, so that no other file is read."""
+    """Replace meshes and height fields by small spheres and remove materials of a model, so that no other file
+    is read."""
     for geom in spec.geoms:
         if _is_mesh(mujoco, geom) or geom.hfieldname:
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, [0.01, 0.01, 0.01]

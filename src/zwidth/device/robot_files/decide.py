@@ -324,7 +324,7 @@ def _spins(motions: FreeMotions, tree: LinkTree, joints: dict[str, Any], name: s
     """
     if joints[name][1].kind != "spherical" or name not in tree.link_of:
         return False
-    # rows of all joints of one coordinate
+    # rows of all joints of one coordinate; entries of others are link/1, link/2, ..., link
     resting = [row for row, entry in enumerate(motions.entries) if len(motions.rows(entry.partition("/")[0])) == 1]
     turning = left_over(left, resting)
     if not turning.shape[1]:

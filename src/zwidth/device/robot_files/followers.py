@@ -40,7 +40,8 @@ ALIGNED: Final = 1e-9  # sine of the angle between axes that count as parallel, 
 
 
 def settle_followers(robot: Robot) -> None:
-    """Set the coordinate of every joint that follows another to what its leader's coordinate asks for."""
+    """Set the coordinate of every joint that follows another to what its leader's coordinate asks for;
+    its offset alone where it has no leader."""
     for _ in robot.followers:  # leaders may follow others themselves
         for one in robot.followers:
             joints = robot.joints

@@ -219,6 +219,7 @@ def root_of(text: str, label: str) -> ElementTree.Element:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         line, column = error.position
+        # behind the colon the parser repeats line and column
         reason = str(error).partition(":")[0]
         if not text.lstrip().startswith("<"):
             raise fail(label, "", "is neither MJCF nor URDF, which are XML; give one of those") from None
@@ -235,7 +236,7 @@ def root_of(text: str, label: str) -> ElementTree.Element:
 
 def included_files(root: ElementTree.Element, folder: Path, label: str) -> None:
     """Check the files that an MJCF file includes, as the file itself is checked. Raises DeviceError."""
-    waiting, seen = [root], {""}
+    waiting, seen = [root], {""}  # MuJoCo says what is wrong with an include without a file
     while waiting:
         for element in waiting.pop().iter("include"):
             name = element.get("file", "")

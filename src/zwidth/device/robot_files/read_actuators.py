@@ -33,8 +33,8 @@ def read_actuators(mujoco: Any, model: Any, robot: Robot) -> None:
 
 
 def _motor(mujoco: Any, model: Any, actuator: int, robot: Robot) -> Motor | None:
-    """The motor of an actuator, given by its index. None for one that is no motor, about which a finding is
-    added."""
+    """The motor of an actuator, given by its index; its joint is that of the largest gear. None for one that is no
+    motor, about which a finding is added."""
     kinds, name = mujoco.mjtTrn, model.actuator(actuator).name
     where = f"actuator '{name or actuator}'"
     turns = _turns(mujoco, model, actuator)

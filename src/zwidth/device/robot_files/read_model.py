@@ -253,6 +253,7 @@ def _tree_faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
         yield Fault(label, "", "has no links; a URDF has <link> and <joint> elements")
     elif not roots:
         yield Fault(label, "", "has no link that nothing carries: its joints go round in a circle")
+    # else a joint whose fault is told above leaves its child without one
     elif len(roots) > 1 and len(carried) == len(root.findall("joint")):
         yield Fault(
             label,

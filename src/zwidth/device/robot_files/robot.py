@@ -66,9 +66,9 @@ UNMOVED: Final = Place(np.eye(3), np.zeros(3))
 class RobotJoint:
     """A joint of a body; its axis and anchor are in the frame of the body as it stands at coordinate 0.
 
-    kind    "revolute", "prismatic", "spherical" or "free"
+    kind    "revolute", "prismatic", "spherical", "free" or "universal"
     value   coordinate at the reference posture: an angle [rad], a way [m], a rotation vector (3,); of a free
-            joint way and rotation vector (6,), in the axes of the body at rest
+            joint way and rotation vector (6,), in the axes of the body at rest; of a universal one its angles (2,)
     limits  lower, upper, or None
     stiffness, damping, coulomb   of the joint itself
     armature  inertia that is added at the joint [kg m²], of a prismatic one [kg]
@@ -220,7 +220,8 @@ class Robot:
 def joint_motion(joint: RobotJoint, value: Any) -> Place:
     """Where a joint takes its body's frame: its place in that frame at coordinate 0.
 
-    value  as of `RobotJoint`: a number, of a ball joint a rotation vector (3,), of a free one way and vector (6,)
+    value  as of `RobotJoint`: a number, of a ball joint a rotation vector (3,), of a free one way and vector (6,);
+           a universal joint, which nothing holds, has no such place
     """
     if joint.kind == "prismatic":
         return Place(np.eye(3), float(value) * joint.axis)

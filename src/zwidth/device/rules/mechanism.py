@@ -144,7 +144,8 @@ def _loop_link_faults(mechanism: dict[str, Any], links: dict[str, Any]) -> KeyMe
 
 
 def _coupling_faults(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
-    """Path and sentence of couplings of drives to joints neither driven nor free, and motors on no link.
+    """Path and sentence of couplings of drives to joints neither driven nor free or without a ratio, and motors on
+    no link or without an axis.
 
     links   name -> joint of each link;   driven  names of the links whose joints have drives
     """
@@ -236,7 +237,7 @@ def _ratio_table_faults(place: KeyPath, given: dict[str, Any], link: dict[str, A
 
 def _assemblies(document: Document) -> KeyMessages:
     """Path and sentence of assemblies that lack a joint's coordinates, give them to other joints, or another
-    number of them."""
+    number of them; and of the reference's assembly, if it is none or must be chosen."""
     mechanism = table(document, "mechanism")
     joints = _joint_kinds(mechanism)
     turning = {name: count for name, joint in joints.items() if (count := ANGLES.get(joint, 0))}
@@ -252,6 +253,7 @@ def _assemblies(document: Document) -> KeyMessages:
             if isinstance(given, dict):
                 path = ("mechanism", "assemblies", name, key)
                 yield from _coordinate_faults(path, given, counts, moves)
+                # those begin at 0 where they are left out
                 needed = {joint for joint in counts if joints[joint] not in ("spherical", "free")}
                 for joint in sorted(needed - set(given)):
                     yield (*path, joint), f"is missing; give an approximate {what}"
@@ -283,7 +285,7 @@ def _coordinate_faults(path: KeyPath, given: dict[str, Any], counts: dict[str, i
 
 
 def _joint_keys(document: Document) -> KeyMessages:
-    """Path and sentence of each key of a link that its kind of joint does not read."""
+    """Path and sentence of each key of a link that its kind of joint does not read, unless it is false."""
     for index, link in tables(table(document, "mechanism"), "links"):
         joint = link.get("joint")
         if not isinstance(joint, str):

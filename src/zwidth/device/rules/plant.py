@@ -65,7 +65,8 @@ def _length_fault(path: KeyPath, vector: Any, size: int | None) -> KeyMessages:
 
 
 def _along_lengths(document: Document) -> KeyMessages:
-    """Path and sentence of spring, brake or winding vectors that do not fit the plant's coordinates."""
+    """Path and sentence of spring, brake or winding vectors that do not fit the plant's coordinates, and
+    of springs without one where there are several coordinates."""
     plant = table(document, "plant")
     size = row_count(plant.get("mass_kg"))
     for group in ("spring", "brake", "electrical_damping"):

@@ -87,8 +87,8 @@ def _encoder_steps(values: Floats) -> list[float]:
 
 
 def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits: Floats) -> Check:
-    """Check that torques vary, stay within the drives' limits (d,) at the joint, and are not cut: refused for the
-    first two, a warning for the last.
+    """Check that torques vary, stay within the drives' limits (d,) at the joint but for 1 % of samples, and are
+    not cut: refused for the first two, a warning for the last.
     """
     constant, cut, beyond = list[str](), list[str](), list[str]()
     for k, name in enumerate(drives):
@@ -191,7 +191,7 @@ def other_readings(
     names    (d,) of the drives
     columns  (n, d, b) of each stretch, torque per unit of each base parameter;   torques  (n, d) as recorded
     Returns  the best such change in words, "" where none is far better; the share of the torques' squares that the
-             fit leaves as recorded; and the share that it leaves with that change
+             fit leaves as recorded; and the least share that any change leaves, inf of a single drive
     """
     X = np.concatenate(list(columns))
     y = np.concatenate(list(torques))
@@ -227,7 +227,8 @@ def other_readings(
 def sign_check(
     names: Sequence[str], labels: Sequence[str], predicted: Sequence[Floats], measured: Sequence[Floats]
 ) -> Check | None:
-    """Check that no drive's torque runs against its prediction in a record (correlation below -0.5); None if so.
+    """Check that no drive's torque runs against its prediction in a record (correlation below -0.5); None where
+    none does.
 
     names, labels  of the drives, and of the records;   predicted, measured  (n, d) torques of each record
     """
@@ -316,6 +317,7 @@ def _column(record: Record, quantity: str, words: Sequence[str], *, alone: bool,
     words  name of the drive, and of its link: either may follow the quantity. Only letters and figures of names
            count, since MATLAB's have no others
     alone  the device has one drive, whose columns may be named by the quantity only
+    Raises DeviceError  for a needed column that is missing, and for two of one quantity
     """
     wanted = {_letters_and_figures(f"{quantity}.{word}") for word in words} | ({quantity} if alone else set())
     present = [name for name in record.names if _letters_and_figures(name) in wanted]
@@ -336,8 +338,8 @@ def _letters_and_figures(name: str) -> str:
 
 
 def check_mechanism(device: Device) -> Mechanism:
-    """The mechanism of a device whose arm can be identified, its links rigid. Raises DeviceError for what the
-    inverse dynamics leave out."""
+    """The mechanism of a device whose arm can be identified, its links rigid. Raises DeviceError without one, and
+    for parts that the fit is not made for (`parts_left_out` are only warned of)."""
     from dataclasses import replace
 
     mechanism = device.mechanism
@@ -367,6 +369,7 @@ def parts_left_out(device: Device) -> list[str]:
     undriven = [i for i in range(len(links.names)) if i not in driven]
 
     def any_of(numbers: Floats | None, some: Sequence[int]) -> bool:
+        # numbers of the links on the last axis; none where the file gives none
         return numbers is not None and bool(np.any(np.asarray(numbers)[..., some]))
 
     parts: Mapping[str, Any] = {

@@ -59,8 +59,8 @@ def quantile(fit: Regression) -> float:
 def link_mass_estimates(
     point: OperatingPoint, masses: Iterable[EffectiveMass], base: BaseParameters, fit: Regression
 ) -> Iterator[Estimate]:
-    """Effective masses at a point; their intervals are those of their logarithm, without bound where the data
-    leave a part of them open, and of no width where nothing of them was fitted."""
+    """Effective masses at a point; their intervals are those of their logarithm, 0 to inf where the data leave
+    a part of them open or the mass is not finite, and of no width where nothing of them was fitted."""
     half_width = quantile(fit)
     assert point.directions is not None
     for mass in masses:
@@ -91,7 +91,7 @@ def joint_friction_estimates(
     device: Device, mechanism: Mechanism, base: BaseParameters, fit: Regression, beta: Floats
 ) -> Iterator[Estimate]:
     """Dry and viscous friction and offset of each drive. Dry friction stands in the file at the motor, viscous
-    friction at the joint; neither is below 0.
+    friction at the joint; neither is below 0. What is no base parameter is left out.
 
     beta  (b,) base parameters
     """
@@ -174,8 +174,8 @@ def link_settings(
 
 
 def _inertia_as_in_file(device: Device, at: str, inertia: Floats, axis: Floats) -> Any:
-    """The inertia (3, 3) in the form that the file has: one number about the joint's axis, three moments, or a
-    matrix.
+    """The inertia (3, 3) in the form that the file has: one number about the joint's axis, three moments where no
+    products of inertia came out, else a matrix, as where the file has none.
 
     at  path of the link;   inertia  about its centre of mass [kg m²];   axis  (3,) of its joint
     """
@@ -197,7 +197,7 @@ def _in_file(device: Device, path: str) -> bool:
 
 
 def _addressable(device: Device, path: str) -> bool:
-    """Whether a device file has a place for this path; a leg's copies have none of their own."""
+    """Whether a device file has a place for this path; a leg's copies have none of their own, and "" has none."""
     from zwidth.errors import DeviceError
 
     if not path:
@@ -240,7 +240,8 @@ class EffectiveMass:
 def effective_masses(
     parameters: Parameters, point: OperatingPoint, values: Floats, known_rotors: Floats
 ) -> Iterator[EffectiveMass]:
-    """The effective masses at a point: the three of `KINDS` along each of its directions.
+    """The effective masses at a point: the three of `KINDS` along each of its directions; inf where no
+    drive moves along it, nan where the masses are not positive definite.
 
     values        (P,) of all parameters, or the base ones and 0 for the others: what the base parameters determine
                   is the same
@@ -322,7 +323,7 @@ def consistent_links(
     """All parameters, of links that can exist, nearest to base parameters beta (b,) of this information (b, b), as
     the module's docstring says.
 
-    Links whose mass the file leaves out begin as rods of one mass per length, and that of the base parameters.
+    Links whose mass the file leaves out begin with 1 kg per metre of their length (`pseudo_inertias`).
     """
     from scipy.optimize import least_squares
 
@@ -398,7 +399,8 @@ def _without_friction(root: Floats, dynamic: Ints, friction: Ints) -> Floats:
 def _parameters_and_slopes(
     parameters: Parameters, roots: Floats, rotors: Floats, x: Floats
 ) -> tuple[Floats, Floats]:
-    """Compute the parameters (P,) of links, friction being 0, and their derivatives (P, count) by x (count,).
+    """Compute the parameters (P,) of links and rotors, friction being 0, and their derivatives (P, count) by
+    x (count,).
 
     roots   (w, 4, 4) lower triangles of the file's pseudo-inertias
     rotors  (r,) inertias of the fitted rotors in the file [kg m²]

@@ -58,7 +58,8 @@ def length_check(seen: Sequence[Compared], validation: Sequence[Compared], base:
 
 
 def excitation_check(fit: Regression, base: BaseParameters, beta: Floats) -> Check:
-    """Check how well the record tells the parameters apart, values beta (b,), against their deviations."""
+    """Check which inertial parameters, of the values beta (b,), the record tells from 0: refused where it tells
+    none, a warning where it does not tell some."""
     inertial = [k for k, j in enumerate(base.kept) if j < base.parameters.friction.start]
     deviations = fit.deviations
     # whose 95 % interval holds 0
@@ -151,6 +152,7 @@ def remainder_check(
     causes = list[str]()
     for i, drive in enumerate(drives):
         names = [f"coulomb({drive})", f"viscous({drive})"]
+        # friction that was not fitted tells no other kind from it
         if not {*names} <= {*base.names}:
             continue
         X, torque = columns[:, i], torques[:, i]
@@ -200,7 +202,8 @@ def consistency_check(links: ConsistentLinks) -> Check:
 
 
 def validation_check(drives: Sequence[str], shares: Sequence[float], edge: float) -> Check:
-    """Check that torques which were not fitted are predicted; refused where no prediction at all would be better.
+    """Check that torques which were not fitted are predicted; refused where no prediction at all would be better,
+    else always a warning.
 
     What is compared has passed a low pass, and the accelerations are the recorded ones: a high share is no proof
     of the numbers, and no reason to call them right.
@@ -263,11 +266,11 @@ class TorqueComparison:
     start: Floats
 
     def of(self, stretch: TorqueStretch, static: Sequence[Floats] = ()) -> Compared:
-        """The measured torques of a stretch, and as columns the torque per unit of each base parameter; the last
-        column is the torques' derivative.
+        """The measured torques of a stretch less those of the known rotors, and as columns the torque per unit of
+        each base parameter; the last column is the torques' derivative.
 
-        static   gravities (3,) of which further columns are made
-        Raises NoAnswerError  where the mechanism cannot be
+        static   gravities (3,) of which further columns are made, the joints at rest
+        Raises NoAnswerError  where the mechanism has no posture
         """
         columns, further = list[Floats](), list[Floats]()
         angles = self.first_posture(stretch)
@@ -353,6 +356,7 @@ def error_sources(
     # 0: the last column, the derivative of the torques, is left out
     best = np.append(fit.values, 0.0)
     by_positions = np.zeros_like(white)
+    # strict=False: the last may lack its partner, and is then left out
     for plus, minus in zip(noisy[::2], noisy[1::2], strict=False):
         for one, other in zip(plus, minus, strict=True):
             # half the difference of both signs: to first order what the noise does

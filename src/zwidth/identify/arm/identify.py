@@ -477,7 +477,7 @@ class _Work:
             *base_estimates(base, fit, beta),
             delay_estimate(fit),
         ]
-        checks += self._mass_checks(estimates[0])
+        checks += self._mass_checks(estimates[0])  # the rigid mass along the first direction
         remarks = (
             f"torques were {self.torque}, at the {self.side}s; the rotors' inertias were {self.rotors}",
             f"compared up to {band.edge:.3g} Hz",

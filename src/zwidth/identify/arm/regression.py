@@ -122,11 +122,11 @@ def regress(
         values = _solve(information, moment)[0]
     freedom = float(max(white.size - len(values), 1))
     wider = np.sqrt(_variance_factors(columns, torques, values, information, whitening, weight, groups))
-    with_delay, delay = np.asarray(_solve(information, moment)[1]), float(values[-1])
+    covariance_with_delay, delay = np.asarray(_solve(information, moment)[1]), float(values[-1])
     information, moment = _without_delay(information, moment)
     values, covariance, unseen, size = _solve(information, moment)
     factors = np.outer(wider[:-1], wider[:-1])
-    deviation = float(wider[-1] * np.sqrt(max(with_delay[-1, -1], 0.0)))
+    deviation = float(wider[-1] * np.sqrt(max(covariance_with_delay[-1, -1], 0.0)))
     return Regression(
         values,
         information / factors,
@@ -176,6 +176,7 @@ def _variance_factors(
     covariance = _solve(information, np.zeros(len(values)))[1]
     usual = np.diag(covariance)
     ratio = np.diag(covariance @ total @ covariance) / np.where(usual > 0.0, usual, 1.0)
+    # as of any mean square of few samples, since the fit makes their sum 0
     ratio = ratio * blocks / max(blocks - 1, 1)
     numbers = np.zeros(len(values), dtype=np.int64) if groups is None else groups
     factors = np.ones(len(values))
@@ -208,7 +209,7 @@ def _inverse_factor(covariance: Floats) -> Floats:
 def _sums(
     columns: Sequence[Floats], torques: Sequence[Floats], whitening: Floats, weight: Floats
 ) -> tuple[Floats, Floats]:
-    """The sums of X^T S^-1 X (b, b) and X^T S^-1 y (b,) over all stretches, filtered.
+    """The sums of X^T S^-1 X (b, b) and X^T S^-1 y (b,) over all stretches longer than the filter, filtered.
 
     columns, torques   (n, d, b), (n, d) of each stretch
     whitening, weight  as in `Regression`, S^-1 = weight^T weight
@@ -263,6 +264,7 @@ def _whitening_filters(residuals: Sequence[Floats], sources: Sequence[Floats]) -
     filters = list[Floats]()
     for j in range(d):
         shapes = np.stack([source[:lags, j] for source in sources])
+        # without the sources that do nothing to this joint
         shapes = shapes[shapes[:, 0] > 0.0]
         if not len(shapes):
             filters.append(np.ones(1))

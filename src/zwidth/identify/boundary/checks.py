@@ -128,7 +128,8 @@ def check_magnitudes(points: BoundaryPoints, edge: EdgeChords) -> Check:
 
 
 def check_circumstances(points: BoundaryPoints, simulated: bool) -> list[Check]:
-    """Whether all points were measured in the same way: a warning for each circumstance that was not.
+    """Whether all points were measured in the same way: a check of each circumstance that any of them says, a
+    warning where it differs and is not simulated.
 
     simulated  the points are compared with trials, and each with one of its own force, time and amplitude
     """
@@ -162,7 +163,7 @@ OFF: Final = 0.1  # relative difference of the periods that is a fault of the fi
 
 def check_file_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
     """Whether the points are explained much better by a sampling period other than the file's; [] where they are
-    not, or where the period is fitted already.
+    not, where the period is fitted already, and where it cannot be freed.
 
     The fit is repeated with the period as a further number. With n points, p numbers before, and D the drop of
     minus twice the log-likelihood, (exp(D / n) - 1) (n - p - 1) has Fisher's distribution with 1 and n - p - 1
@@ -261,6 +262,7 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
     largest = np.where(edges.kind == TIP, np.max(edges.stiffness), np.max(np.abs(edges.damping)))
     sizes = np.where(edges.kind == EDGE, deviations.value * fit.scatter.damping, deviations.value)  # N/m, N s/m
     remains = float(np.sqrt(np.mean((sizes / np.maximum(largest, 1e-300)) ** 2)))
+    # of an exact fit rounding remains, whose pattern means nothing
     faults, chance = list[str](), 1.0 if remains < EXACT else _chance_of_pattern(edges, deviations.value / units)
     if chance < SYSTEMATIC:
         faults.append("what remains follows a pattern along the edges instead of scattering")
@@ -335,7 +337,7 @@ def _chance_of_mean(values: Floats) -> float:
 
 def _chance_of_repeats(edges: BoundaryPoints, normalised: Floats) -> float | None:
     """Probability that the means of repeated points deviate as much by the scatter of the repetitions alone
-    (Fisher's test); None where too few were repeated.
+    (Fisher's test); None where too few were repeated, or the repetitions are all equal.
 
     normalised  (n,) deviations of the points over their scatter
     """

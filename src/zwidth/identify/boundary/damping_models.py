@@ -210,5 +210,6 @@ def _with_damping(plant: Plant, name: str, numbers: Floats) -> Plant:
         case "drive":
             B = numbers[0] * np.outer(a, a)
         case _:
+            # hysteretic: in place of a loss factor that the plant has
             return replace(plant, hysteresis=numbers[0] * K)
     return replace(plant, damping=plant.damping + B)

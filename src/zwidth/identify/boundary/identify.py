@@ -301,6 +301,7 @@ def _remarks(model: BoundaryModel, fit: BoundaryFit, records: Sequence[Record]) 
     edges = model.points[model.points.on_edge]
     normalised = fit.deviations.value / model.units(fit.scatter)
     typical = 1.4826 * float(np.median(np.abs(normalised)))  # robust standard deviation
+    # nothing lies far where all is met but for rounding
     far = np.abs(normalised) > OUTLIER * typical if typical > ROUNDING else np.zeros(len(edges), dtype=bool)
     places = [
         f"{records[edges.record[i]].place(int(edges.row[i]))} of {records[edges.record[i]].label}"
@@ -315,7 +316,7 @@ def _remarks(model: BoundaryModel, fit: BoundaryFit, records: Sequence[Record]) 
 
 
 def _curves(model: BoundaryModel, fit: BoundaryFit) -> dict[str, list[Any]]:
-    """The points with what was fitted to them, one a row."""
+    """The points with what was fitted to them, one a row; nan beside walls that were only tried."""
     points, on_edge = model.points, model.points.on_edge
     columns: dict[str, list[Any]] = {
         "stiffness_N_per_m": points.stiffness.tolist(),
@@ -416,7 +417,8 @@ class DampingComparison:
 
     @property
     def sentences(self) -> list[str]:
-        """What the comparison tells about the models, and which of them it does not tell apart, in words."""
+        """What the comparison tells about the models, and which of them it does not tell apart, in words;
+        [] of a single model."""
         if len(self.models) < 2:
             return []
         best, *others = self.models

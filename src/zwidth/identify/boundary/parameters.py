@@ -157,7 +157,7 @@ class BoundaryParameters:
     def _usual_change(self, i: int) -> float:
         """A usual change of the i-th number: 0.3 of it; where it is 0, the power of ten by which it must change
         for the largest stiffness of the chart to change by a hundredth, or a tenth of that which leaves no chart;
-        1 where none does either."""
+        1 where none does either, or there is no chart to begin with."""
         if self.start[i] != 0.0:
             return 0.3 * abs(float(self.start[i]))
         try:
@@ -176,8 +176,9 @@ class BoundaryParameters:
 
 
 def _bounds(numbers: DeviceNumbers, i: int) -> tuple[float, float]:
-    """Bounds of the i-th number as the vector has it, by which values the file allows; infinite where it sets
-    none. Raises DeviceError for a number that cannot be varied alone."""
+    """Bounds of the i-th number as the vector has it, by which values the file allows: the start itself to a side
+    on which a small step is refused; else WIDEST away or the file's limit, and of a number that is not positive
+    infinite. Raises DeviceError for a number that cannot be varied alone."""
     vector = numbers.vector(numbers.start)
     start = float(vector[i])
 

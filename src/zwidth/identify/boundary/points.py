@@ -180,7 +180,8 @@ def _points_of(record: Record, index: int) -> BoundaryPoints:
 
 
 def _wall_numbers(record: Record, columns: dict[str, NDArray[Any]], names: tuple[str, ...]) -> Floats:
-    """Stiffness or damping of the rows, in the column that is there of these names; an empty cell stays nan."""
+    """Stiffness or damping of the rows, in the column that is there of these names; an empty cell stays nan.
+    Raises DeviceError for an infinite or far too large number."""
     name = next(name for name in names if name in columns)
     values = columns[name]
     beyond = np.flatnonzero(~(np.abs(np.nan_to_num(values)) <= LARGEST) | np.isinf(values))
@@ -198,6 +199,7 @@ def _kinds(record: Record, columns: dict[str, NDArray[Any]], count: int) -> NDAr
     """`BoundaryPoints.kind` of each row (n,); a row of which no column says anything lies on the boundary.
 
     columns  of the record by name, each of `count` rows
+    Raises   DeviceError  for a word that is not known, and words of a row that contradict each other
     """
     kind = np.full(count, EDGE, dtype="U8")
     for name in ("kind", "verdict", "edge"):  # lower, upper and tip say more than boundary

@@ -329,8 +329,9 @@ def _simulated_edges(
 
 
 def _crossings(points: BoundaryPoints, trial: StabilityTrial, place: StableExtent) -> EdgeCrossing:
-    """The edges that one trial finds at points: along damping, or along stiffness for a tip; a wall that was tried
-    is taken to the nearest edge along damping, and along stiffness where no damping is stable.
+    """The edges that one trial finds at points: along damping, or along stiffness for a tip; walls that were
+    tried, and points of an unknown edge, are taken to the nearest edge along damping; the walls along stiffness
+    where none was found.
 
     place  where stable walls are looked for
     """

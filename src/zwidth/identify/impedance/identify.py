@@ -120,6 +120,7 @@ def identify_impedance(
     if not states:
         return Identification(KIND, device.label, tuple(checks))
     checks += [check for state in states for check in _check_against_prediction(state, wall)]
+    # not for any failed check: one state of the wall may lack coherence, and the other have it
     if any(not (check.passed or check.warning) and check.what in ("units", "sign", "columns") for check in checks):
         return Identification(KIND, device.label, tuple(checks))
     return _identification(device, checks, states)
@@ -289,6 +290,7 @@ def _measured_state(
             "shorter segments"
         )
         return None, Check("coherence", False, text)
+    # half the sampling rate [Hz]: of the record, or of the device where that is less
     half = 0.5 / spectra.period
     if point.response is None:
         half = min(half, 0.5 / point.controller.sampling_period)
@@ -421,7 +423,8 @@ def _decibels(Z: Complexes, P: Complexes) -> Floats:
 
 
 def _validation(states: Sequence[_State]) -> float:
-    """Share of the unseen motion's power that the force explains through the response of the other part."""
+    """Share of the unseen motion's power that the force explains through the response of the other part; nan where
+    no frequency can be predicted."""
     remains, total = 0.0, 0.0
     for state in states:  # channels: 0 force, 1 position
         if not (state.first.segments and state.second.segments):

@@ -130,7 +130,7 @@ def local_spectra(stretches: Iterable[Piece], period: float, length: int, names:
     """Sums over the segments of `length` samples that fit into pieces of a record, end to end, none across a gap.
 
     stretches  pieces with a column "sample" that numbers the samples, as `SampleTimes.stretches` makes them
-    names      of the columns of force and position
+    period     of the samples [s];   names  of the columns of force and position
     """
     count = max((length // 2 - 2 * HALF) // STRIDE, 0)
     middles = 1 + HALF + STRIDE * np.arange(count)

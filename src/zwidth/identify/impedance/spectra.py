@@ -101,6 +101,7 @@ def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, leve
     reached = np.interp(shift, *_shifts_and_half_widths(level, size))
     # the deviation is itself estimated: Fisher's quantile in place of chi-square's
     wider = np.sqrt(size * fisher.ppf(level, size, 2.0 * max(freedom, 0.5)) / chi2.ppf(level, size))
+    # what of the bias lies beyond FAR deviations, where the table ends
     beyond = np.maximum(bias - shift * deviation, 0.0)
     return np.asarray(deviation * (shift + (reached - shift) * wider) + beyond)
 
@@ -141,8 +142,8 @@ def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedan
 
 
 def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, float, float]:
-    """The lowest or highest |Z| of all frequencies: index of its frequency, the value, and both ends of its
-    interval (95 %) [N s/m].
+    """The lowest or highest |Z| that is surest: index of the frequency whose band ends lowest (begins highest),
+    |Z| there, and both ends (95 %) of the interval of the lowest (highest) of all [N s/m].
 
     Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of the end towards the
     others is raised by the number of independent ones among those whose bands reach the extreme one. The other

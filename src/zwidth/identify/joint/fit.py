@@ -200,8 +200,8 @@ class JointFit:
         for number, other in self.numbers.tied:
             by_free[other] += by_free[number]
         by_free = by_free[list(self.numbers.free)]
-        known = by_free != 0.0
-        if np.any(~np.isfinite(np.diag(self.covariance)[known])):
+        involved = by_free != 0.0
+        if np.any(~np.isfinite(np.diag(self.covariance)[involved])):
             return value, np.inf, 1.0
         covariances = np.einsum("i,gihj,j->gh", by_free, self.weights, by_free)
         expected = float(np.trace(covariances))
@@ -340,8 +340,8 @@ def scales(windows: Windows) -> Floats:
     length = float(np.mean(windows.length)) * T
     v = x / (0.25 * length)  # of a motion that goes over its range in a quarter of a window
     a = v / (0.25 * length)
-    f = float(np.std(windows.force)) if windows.driven else a
-    f = f if f > 0.0 else a  # of free motion all numbers are over the mass
+    f = float(np.std(windows.force)) if windows.driven else a  # of free motion all numbers are over the mass
+    f = f if f > 0.0 else a  # of a constant force
     # m, b and F forward and backward, k, delay, three drifts; position and velocity of a start
     return np.array([f / a, f / v, f / v, f, f, f / x, T, f, f, f, x, v])
 

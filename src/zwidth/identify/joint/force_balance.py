@@ -89,7 +89,8 @@ NOTHING: Final = ForceBalance(np.zeros(COUNT), np.zeros((COUNT, COUNT)), 1.0, np
 
 
 def force_balance(windows: Windows, resolution: float, *, delay: float = 0.0, spring: bool = True) -> ForceBalance:
-    """The balance over segments of the length at which it says most of the mass.
+    """The balance over segments of the length, and with the share of motion, at which it says most of the mass;
+    `depends` where any of those tried does.
 
     resolution  of the readings [m or rad];   delay  of the force [s];   spring  whether one may act
     Returns     `NOTHING` where too few segments hold motion
@@ -189,6 +190,8 @@ def _covariance(inverse: Floats, remainder: Floats, freedom: float) -> Floats:
     of one size over the record, and correlated over neighbouring rows; no less than if rows were independent.
 
     The autocovariances are weighted with a triangle (Newey and West 1987, known at second hand).
+
+    freedom  degrees of freedom of the remainder, rows that overlap counted as fewer
     """
     n = len(remainder)
     variance = float(remainder @ remainder) / max(freedom * OVERLAP, 1.0)
@@ -300,7 +303,7 @@ def _few_of(which: Flags) -> Flags:
 
 
 def groups_of(windows: Windows, motion: JointMotion, records: Sequence[Record]) -> dict[str, Flags]:
-    """Windows of each record, or of parts of a single one, by their names."""
+    """Windows of each record, or of parts of a single one, by their names; those of `FEWEST` and more."""
     record_of_run = {one.run: one.record for one in motion.sections}
     owner = np.array([record_of_run[int(run)] for run in windows.run])
     if len(records) > 1:
@@ -328,7 +331,8 @@ FEW_LEVELS: Final = 50  # values of a force that is meant to have flat tops, as 
 
 
 def checks_of(motion: JointMotion, windows: Windows, joint: Joint) -> list[Check]:
-    """All checks of what was recorded, in an order in which each assumes those before it."""
+    """All checks of what was recorded, in an order in which each assumes those before it; the later
+    ones only where these passed."""
     checks = [check_joint_motion(motion, joint), check_units(motion, joint)]
     if not checks[0].passed:
         return checks
@@ -343,7 +347,7 @@ def checks_of(motion: JointMotion, windows: Windows, joint: Joint) -> list[Check
 
 
 def check_joint_motion(motion: JointMotion, joint: Joint) -> Check:
-    """That the joint moves, by more than ten steps of its encoder."""
+    """That the joint moves, by more than ten steps of its encoder, or times its noise where no steps show."""
     travel, unit = float(np.ptp(motion.positions)), joint.unit("position")
     if travel == 0.0:
         return Check("motion", False, f"{joint.position} is constant; record the joint while it moves")
@@ -403,7 +407,8 @@ def _unit_slip(ratio: float, *, angular: bool) -> str:
 
 
 def check_force(motion: JointMotion, joint: Joint) -> Check:
-    """That the force changes: under a constant one only ratios of friction and mass can be told."""
+    """That the force changes: under a constant one only ratios of friction and mass can be told; a warning
+    where it is 0 throughout, which counts as free motion."""
     forces, unit = motion.forces, joint.unit("force")
     if not motion.driven:
         return Check(
@@ -514,7 +519,7 @@ def check_standstill(motion: JointMotion) -> Check:
 
 
 def check_saturation(motion: JointMotion, joint: Joint) -> list[Check]:
-    """Whether the force has flat tops, or lies beyond what the drive gives."""
+    """Whether the force has flat tops, or lies beyond what the drive gives; [] of free motion."""
     if not motion.driven:
         return []
     forces, unit, name = motion.forces, joint.unit("force"), motion.force_name
@@ -530,6 +535,7 @@ def check_saturation(motion: JointMotion, joint: Joint) -> list[Check]:
                 warning=True,
             )
         ]
+    # a force of few levels, as binary noise, is at its largest on purpose
     levels = len(np.unique(forces[:200_000]))
     flat = max(float(np.mean(forces == np.max(forces))), float(np.mean(forces == np.min(forces))))
     if flat > FLAT and levels > FEW_LEVELS:

@@ -190,7 +190,7 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
 
 
 def mass_estimates(fitted: FittedJoint) -> list[Estimate]:
-    """The mass and the delay of the force, which driven motion tells."""
+    """The mass and the delay of the force, which driven motion tells; [] of free motion."""
     if not fitted.motion.driven:
         return []
     delay = fitted.fit.interval(ONE[DELAY])
@@ -213,7 +213,8 @@ def untold_mass(fitted: FittedJoint) -> str:
 
 
 def usual_speed(fitted: FittedJoint, side: float) -> float:
-    """Median speed at which the joint slides to a side, 1 forward or -1, in the fitted windows [m/s or rad/s]."""
+    """Median speed at which the joint slides to a side, 1 forward or -1, in the fitted windows [m/s or rad/s]; 0
+    where it never does."""
     windows, resolution = fitted.fit.windows, fitted.motion.resolution
     speeds = list[Floats]()
     for first, length, T in zip(windows.first, windows.length, windows.period, strict=True):
@@ -226,7 +227,8 @@ def usual_speed(fitted: FittedJoint, side: float) -> float:
 
 
 def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
-    """Mean velocity (s,) and friction (s,) in segments in which the joint slides one way throughout."""
+    """Mean velocity (s,) and friction (s,) in segments in which the joint slides one way throughout;
+    none where driven motion does not tell the mass."""
     windows, numbers = fitted.fit.windows, fitted.fit.numbers.values
     if fitted.motion.driven and not fitted.tells_mass:  # what accelerates the mass cannot be taken from the force
         return np.zeros(0), np.zeros(0)
@@ -416,7 +418,8 @@ class Comparison:
 
 
 def compare_with_command(motion: JointMotion) -> Comparison | None:
-    """The comparison over all sections; None where only one of the two was recorded, or one does not change.
+    """The comparison over all sections; None where only one of the two was recorded, one does not change, or
+    fewer than ten samples have room for the lags.
 
     The lag is where the correlation of the two is largest, between samples by a parabola through three of them.
     """

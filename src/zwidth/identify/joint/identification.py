@@ -132,7 +132,8 @@ def fitted_joint(
 ) -> tuple[tuple[Check, ...], FittedJoint | None]:
     """All checks, and what was fitted; None where a check refuses the data.
 
-    spring          whether a spring holds the joint; None: where the file has one, or the data show one
+    name            of the joint, as `joint_of` takes it
+    spring          whether a spring holds the joint; None: where the data show one
     mass_from_file  free motion tells friction over mass: take the mass of the file
     Raises          DeviceError  for a joint that the device has not, columns that are not the joint's, cells that
                     are no numbers, and no mass in the file
@@ -165,6 +166,7 @@ def fitted_joint(
     )
     checks += _checks_after_fit(fitted, windows, numbers, records)
     fitted = replace(fitted, checks=tuple(checks))
+    # the last check alone decides: after one that refuses no further one is made
     return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
 
 

@@ -291,7 +291,8 @@ def _joint_at_link(device: Device, link: LegMember, drives: dict[str, tuple[int,
 
 
 def _inertia_at_motor(device: Device, index: int) -> float:
-    """Inertia at the shaft of a motor by the file, all other drives standing [kg m²]; nan where it gives none."""
+    """Inertia at the shaft of a motor by the file, all other drives standing [kg m²]; nan where it gives none,
+    where the reference is no posture, and of a surplus drive."""
     from zwidth.errors import PostureError
 
     assert device.mechanism is not None

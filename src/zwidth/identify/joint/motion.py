@@ -113,6 +113,8 @@ def direction_of(x: float, v: float, force: float, numbers: Floats) -> int:
 def after_part(x: float, v: float, force: float, h: float, numbers: Floats, steps: Floats) -> tuple[float, float]:
     """Position and velocity, from x and v, after a part of an interval, h long [s], under a constant force.
 
+    A joint that turns round `MOST_TURNS` times in the part is taken to stand.
+
     numbers  (6,)    m, b forward and backward, F forward and backward, k, as in `follow_windows`
     steps    (2, 6)  `flow` over h, forward and backward
     """
@@ -138,6 +140,7 @@ def after_part(x: float, v: float, force: float, h: float, numbers: Floats, step
             )
         # at the end, if the joint does not turn round; else it stands at the time t, and goes on from there
         xn, vn = p11 * x + p12 * v + g1 * push, p21 * x + p22 * v + g2 * push
+        # from rest the joint cannot turn round: a velocity against its side is rounding
         if vn * side >= 0.0 or v == 0.0:
             return xn, vn
         t = turning_time(

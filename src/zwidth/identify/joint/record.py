@@ -96,7 +96,7 @@ class JointMotion:
 def read_motion(records: Sequence[Record], samplings: Sequence[SampleTimes], joint: Joint) -> JointMotion:
     """The motion in all records, each read once more; of more than 300 000 samples sections all over them.
 
-    Raises DeviceError  for columns that are not the joint's
+    Raises DeviceError  for columns that are not the joint's, and records that differ in what drives it
     """
     total = sum(int(np.sum(np.diff(sampling.runs, axis=1))) for sampling in samplings)
     columns = [joint.force_column(record) for record in records]

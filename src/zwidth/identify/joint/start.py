@@ -43,7 +43,7 @@ class Guess:
 
     values     (10,) as `fit.JointNumbers` has them
     explained  share of the weighted force that is explained
-    error      standard error of the mass over the mass; inf where it is no positive number
+    error      standard error of the mass over its size: inf for a mass of 0, 0 of free motion, whose mass is 1
     """
 
     values: Floats
@@ -251,6 +251,7 @@ def _guesses(windows: Windows, numbers: JointNumbers, step: float) -> Iterator[J
     partly = [first_guess(windows, n, step, moving=PARTLY) for n in (SHORTEST, 2 * SHORTEST)]
     values = [guess.values for guess in (*sure, *partly) if guess is not None]
     values += [_numbers_of_bursts(windows, share) for share in LEVELS] if windows.driven else []
+    # without any guess: a mass of the usual size alone
     for given in values or [np.eye(len(sizes))[MASS] * sizes]:
         guess = given[: len(numbers.values)].copy()
         # a balance may find masses and friction below 0

@@ -65,11 +65,11 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
             "and read?"
         )
         return [Check("motion", False, reason)]
-    steps = max(step, given_step)
-    if steps:
-        counts = position / steps
+    larger_step = max(step, given_step)
+    if larger_step:
+        counts = position / larger_step
         from_where = "as the positions show" if step >= given_step else "by the device file"
-        reason = f"{names.position} of {label} moves by {counts:.3g} steps of {steps:.3g} ({from_where})"
+        reason = f"{names.position} of {label} moves by {counts:.3g} steps of {larger_step:.3g} ({from_where})"
         if counts < COUNTS:
             reason += f"; at least {COUNTS:.0f} are needed: drive the device harder, or at lower frequencies"
         checks.append(Check("motion", bool(counts >= COUNTS), reason))
@@ -88,10 +88,10 @@ def _saturation_check(source: Source, levels: Levels, limit: float) -> Check:
     """
     names, label = source.channels, source.record.label
     share = levels.at_limit / levels.count
-    beyond = float(np.max(np.abs([levels.low[0], levels.high[0]])))
-    if beyond > limit * (1.0 + 1e-9):
+    largest = float(np.max(np.abs([levels.low[0], levels.high[0]])))
+    if largest > limit * (1.0 + 1e-9):
         reason = (
-            f"{names.force} of {label} reaches {beyond:.4g}, but the device commands {limit:.4g} at most: what "
+            f"{names.force} of {label} reaches {largest:.4g}, but the device commands {limit:.4g} at most: what "
             "moved it is not what is written; drive it less"
         )
         return Check("saturation", False, reason)
@@ -189,9 +189,10 @@ def feedback_check(force: Floats, position: Floats, period: float, free: bool) -
     Where nothing else excites the device, such a force leaves U/Y = -k, whatever the device is: a constant,
     against the position. No device without feedback has this at the lowest frequencies: a free mass has -m w^2,
     which grows with the square of the frequency, a spring to the ground has +k. A device on a spring is not
-    checked.
+    checked, nor is a stretch too short or still.
 
-    force, position  (n,) a stretch;   free  whether the device has a motion without a spring
+    force, position  (n,) a stretch, sampled every `period` [s];   free  whether the device has a motion without a
+                     spring
     """
     window = np.hanning(len(force))
     U, Y = (np.fft.rfft((values - values.mean()) * window)[LOWEST] for values in (force, position))
@@ -215,7 +216,7 @@ def sign_and_unit_checks(
     spectra: Spectra, excited: Flags, value: Complexes, own: Complexes, turns: bool
 ) -> list[Check]:
     """Check the response (n,) against that of the device as its file has it: its sign, and whether the units are
-    plausible.
+    plausible; [] where fewer than four lines can be trusted.
 
     excited  (n,) lines with force;   value  (n,) response [m/N]
     own      (n,) response of the device at the spectra's frequencies;   turns  under a torque
@@ -336,6 +337,7 @@ def amplitude_check(
     difference = float(np.sum(np.abs(of_small.value[known] - of_large.value[known]) ** 2 / variance))
     count = 2 * int(np.count_nonzero(known))
     relative = float(np.median(np.abs(of_small.value[known] / of_large.value[known] - 1.0))) if count else 0.0
+    # "N" of the column force_N, "Nm" of command_Nm
     forces = f"{size[small]:.3g} and {size[large]:.3g} {sources[0].channels.force.partition('_')[2]}"
     # by chance alone the sum has the mean `count` and the variance 2 `count`
     if count == 0 or difference < count + SURE * np.sqrt(2.0 * count):
@@ -345,6 +347,7 @@ def amplitude_check(
     reason = f"the response differs by {100.0 * relative:.2g} % in the middle between {forces}: "
     crest = np.array([np.max(np.abs([one.low[0], one.high[0]])) for one in levels]) / np.maximum(size, 1e-300)
     friction = ""
+    # of sines alone an amplitude X, and so f_c, is known
     if np.all(np.abs(crest[[small, large]] / np.sqrt(2.0) - 1.0) < SINE):
         f_c = _coulomb_friction(of_small, of_large, known, np.sqrt(2.0) * size[small], np.sqrt(2.0) * size[large])
         friction = f" of about {f_c:.2g} {sources[0].channels.force.partition('_')[2]}" if f_c > 0.0 else ""

@@ -134,7 +134,7 @@ def identify_modes(
             "longer"
         )
         return Identification("modes", device.label, (*checks, Check("duration", False, reason)))
-    # the first number of the vector is the delay [samples]
+    # the first number of the vector is the delay [samples]; 1.0 below: the pilot's misfit is small enough
     if pilot.vector[0] < SHIFTED and pilot.misfit < MISFIT:
         checks.append(shift_check(float(pilot.vector[0]), float(pilot.vector[0]), 1.0))
         return Identification("modes", device.label, tuple(checks))
@@ -170,7 +170,7 @@ def _check_options(
 def _checked_sources(
     device: Device, point: OperatingPoint, records: Sequence[Record]
 ) -> tuple[list[Source], list[Check]]:
-    """The records with a regular sampling as sources, kept in memory where they are short; the check of each."""
+    """The records of the loop's sampling as sources, at its exact period, kept where short; the check of each."""
     sources, checks = list[Source](), list[Check]()
     for record in records:
         sampling, check = check_sampling(record, point.loop.period)
@@ -203,7 +203,7 @@ class _Seen:
 def _check_survey(
     device: Device, point: OperatingPoint, sources: Sequence[Source], survey: Survey, estimator: Estimator | None
 ) -> _Seen:
-    """Check levels, excitation, feedback and units of the records, and say up to which frequency to fit them."""
+    """Check levels, excitation, feedback and units, and say up to which frequency to fit: 0 where not known."""
     checks = _checks_of_levels(device, point, sources, survey.levels)
     nothing = np.zeros(0)
     closed = bool(sources[0].channels.reference)
@@ -242,7 +242,8 @@ def _check_survey(
 def _checks_of_levels(
     device: Device, point: OperatingPoint, sources: Sequence[Source], levels_of: Sequence[Levels]
 ) -> list[Check]:
-    """Check the length of each record, and the values in its columns, by its levels; return these checks."""
+    """Check the length of each record, and the values in its columns, by its levels; return these checks.
+    Only a [plant] states its encoder's step in the position's unit."""
     checks = list[Check]()
     given = device.document.get("loop", {}).get("encoder", {}).get("resolution_m", 0.0)
     given = float(given) if point.given_plant is not None and isinstance(given, int | float) else 0.0

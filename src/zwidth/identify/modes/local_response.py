@@ -78,8 +78,9 @@ def bands(
     """Bands that cover low to high [Hz], each narrow beside its distance to the nearest pole.
 
     line     distance of two lines of the longest stretch [Hz]
-    poles    in continuous time [1/s], of either sign of their imaginary part
-    singles  frequency [Hz] up to which lines are kept one by one, as poles are not known there yet
+    poles    in continuous time [1/s], of either sign of their imaginary part;   period  of the samples [s]
+    singles  frequency [Hz] up to which lines are kept one by one, as poles are not known there yet; the lowest
+             `LOWEST` lines always are
     """
     natural = np.abs(np.imag(poles)) / (2.0 * np.pi)
     nyquist = 0.5 / period
@@ -340,7 +341,8 @@ class Lines:
 def transformed(force: Floats, position: Floats, reference: Floats | None, period: float) -> Lines:
     """The lines of a stretch, scaled to the same power of a white noise whatever its length.
 
-    force, position, reference  (n,); a stretch with large prime factors loses a few samples at its end
+    force, position, reference  (n,), sampled every `period` [s]; a stretch whose length has large prime factors
+                                loses a few samples at its end
     """
     from scipy.fft import prev_fast_len, rfft
 
@@ -400,7 +402,7 @@ class RecordResponse:
 
 
 def response_in_bands(record: BandedRecord) -> RecordResponse:
-    """The map of the sums in `record`.
+    """The response that the sums in `record` hold, as rows that a model is fitted to.
 
     The noise of a band is what the five numbers leave of its lines, averaged over a few bands about it.
     Raises ValueError  where no band has lines enough
@@ -442,6 +444,7 @@ def response_in_bands(record: BandedRecord) -> RecordResponse:
         banded.append(rows @ TO_LEGENDRE * (z[i] - 1.0) ** 2)
         targets.append((rows @ values[i])[kept])
         # without a model: the polynomial at the middle, its differences undone
+        # nan where the lines do not tell all five numbers
         spread = (
             np.abs(axes.T @ at_zero) ** 2 / np.where(kept, size, np.inf) if kept.all() else np.full(TERMS, np.nan)
         )

@@ -135,7 +135,9 @@ def fit_modes(
     criterion falls by more than ten. The device is taken for a free one at first; in the end for a braked one, or
     one on a spring, where that explains it better.
 
-    near  modes that are known to be about right, to begin with; None: none
+    period  of the loop [s]
+    near    modes that are known to be about right, to begin with; None: none
+    most    of modes
     """
     if near is None:
         starts = (_residues_solved(data, "free", period, np.array([d])) for d in FIRST_DELAYS)
@@ -187,13 +189,14 @@ def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
     A[n:, :n] = -np.linalg.solve(plant.mass, plant.stiffness)
     A[n:, n:] = -np.linalg.solve(plant.mass, plant.damping)
     poles = np.linalg.eigvals(A)
+    # logarithms of the slowest and the fastest rate [1/s] that is looked for
     low, fast = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
     # 1e-9: real to rounding; a pole of 0 is no mode
     real = np.sort(
         np.abs(poles[(np.abs(poles.imag) < 1e-9 * np.abs(poles)) & (np.log(np.abs(poles) + 1e-300) > low)].real)
     )
     rates_and_ratios = [(np.abs(p), -p.real / np.abs(p)) for p in poles if p.imag > 1e-9 * np.abs(p)]
-    # two real poles a and b make w^2 = a b and 2 zeta w = a + b
+    # two real poles a and b make w^2 = a b and 2 zeta w = a + b; of an odd number the fastest is left out
     rates_and_ratios += [
         (np.sqrt(a * b), 0.5 * (a + b) / np.sqrt(a * b)) for a, b in zip(real[::2], real[1::2], strict=False)
     ]
@@ -207,7 +210,8 @@ def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
 
 
 def _pruned(data: RecordResponse, fit: ModalFit) -> ModalFit:
-    """The modes without those whose loss raises the information criterion by no more than `STRONG`."""
+    """The modes without those whose loss raises the information criterion by no more than `STRONG`; one
+    is always kept."""
     while fit.count > 1:
         shorter = list[ModalFit]()
         for i in range(fit.count):
@@ -390,7 +394,7 @@ def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coup
     """The columns of `ModalFit.columns`: the base, each mode, all faster ones, and, where dampers couple the
     modes, each mode's velocity over w, less that of the brake or of the first mode.
 
-    vector  delay, brake and modes, as `ModalFit` has them
+    vector  delay, brake and modes, as `ModalFit` has them;   period  of the loop [s]
     """
     before = 2 if base == "free, braked" else 1
     columns = list[_Column]()
@@ -469,7 +473,8 @@ def _held_responses(
 ) -> Complexes:
     """Held and sampled responses (n, c) of 1/(s^2 + 2 a s + w^2), of c pairs a, w^2, at angles (n,).
 
-    delay     [samples];   velocity  factor of the velocity, which is given in place of the motion; 0: the motion
+    period    of the loop [s];   delay  [samples]
+    velocity  factor of the velocity, which is given in place of the motion; 0: the motion
     """
     whole, fraction = split_delay(delay)  # samples
     d = (2j * np.sin(0.5 * theta) * np.exp(0.5j * theta))[:, None]

@@ -242,7 +242,7 @@ def _elements(
 
     A spring between two coordinates is four entries of the matrix, which go together; so are a damper and, without
     the signs, a coupled mass. What is 0 in the file is not there, but for a damper beside each spring: to say that
-    there is none is a measurement, too.
+    there is none is a measurement, too. Raises DeviceError where a spring or damper is negative.
     """
     name, _ = MATRICES[key]
     matrix, n = getattr(plant, name), plant.size

@@ -54,6 +54,7 @@ def survey_of(sources: Sequence[Source], segment: int | None, progress: Progress
     longest = max((min(one.sampling.longest, BLOCK) for one in sources), default=0)
     first = next((one.first() for one in sources if one.first() is not None), None)
     period = 0 if first is None else period_of(first.force)
+    # the force's period where it has 64 samples or more and four of it fit
     length = segment_length(longest, segment or (period if 64 <= period <= longest // 4 else None))
     length = min(length, LONGEST_SEGMENT) if segment is None else length
     differences = {"force": 0, "position": 2} | ({"reference": 0} if sources[0].channels.reference else {})
@@ -155,7 +156,7 @@ CLEAR: Final = 3.0  # times its noise, that a line's mean is there
 
 
 def period_of(force: Floats) -> int:
-    """The period of a force [samples]; 0 where it does not repeat.
+    """The period of a force [samples]; 0 where it does not repeat, or fewer than `FEWEST_PERIODS` times.
 
     The first lag at which the autocorrelation is that of an equal signal, and the difference to one period before
     is almost nothing.
@@ -183,7 +184,7 @@ def period_of(force: Floats) -> int:
 
 
 def periodic_lines(period: int, source: Source, details: dict[str, Any]) -> list[str]:
-    """What the periods say beside the response: remarks, and numbers in `details`.
+    """What the periods say beside the response: remarks, and numbers in `details`; [] of too few periods.
 
     Coherence compares periods with each other, so that what repeats in each of them, a nonlinearity's answer,
     looks like the device. A multisine of odd harmonics shows it: at even lines the position has what an even
@@ -325,6 +326,7 @@ class Spectra:
         Hv = least squares of both, in equal shares of their powers (Vold; known at second hand):
              sqrt(S_yy/S_uu) in magnitude, the phase of S_yu
         joint = S_yr/S_ur     noise that a loop feeds back from the reading to the force; needs a reference
+        0 where a spectrum that divides is 0. Raises ValueError for another estimator.
         """
         u, y = self.power(into), self.power(out)
         cross = self.of(out, into)
@@ -358,7 +360,7 @@ def averaged_spectra(
     """Welch's averaged spectra of stretches of a record: Hann windows of `length` that overlap by half, each less
     its mean, none from one stretch into the next (Welch 1967).
 
-    stretches    each with its channels as columns (n,)
+    stretches    each with its channels as columns (n,), sampled every `period` [s]
     differences  channels, and how often each is differenced: a position that drifts leaks into every line
     """
     names = tuple(differences)
@@ -366,6 +368,7 @@ def averaged_spectra(
     sums = _SpectraSums(len(names), length)
     for stretch in stretches:
         sums.add([stretch[name] for name in names], order)
+    # without lines 0 and 1, into which a Hann window spreads the mean
     usable = slice(2, None)
     n = max(sums.count, 1)
     frequency = np.arange(length // 2 + 1) / (length * period)

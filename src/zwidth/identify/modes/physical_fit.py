@@ -75,6 +75,8 @@ def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period
 
     From the file's numbers first, and from others where these may not lead there (`_Search`). Where a response
     says little of a mode, several minima are hardly different, and all of them set the ends of intervals.
+
+    modal  modes that explain the same response by themselves;   period  of the loop [s]
     """
     low, high = _search_bounds(model, period)
     # 1e-300: the logarithm of 0, which is clipped to the bounds

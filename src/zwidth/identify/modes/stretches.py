@@ -67,6 +67,7 @@ def channels_of(device: Device, point: OperatingPoint, record: Record) -> Channe
     command = f"command_{unit}"
     measured = force if command in record else ""
     reference = f"reference_{unit}" if f"reference_{unit}" in record else ""
+    # where there is a command it is what drives, and the force is what was measured of it
     return Channels(command if measured else force, position, reference, measured)
 
 
@@ -143,7 +144,7 @@ class Levels:
         if self.origin is None:
             self.origin = both[:, 0].copy()
         low, high = both.min(axis=1), both.max(axis=1)
-        if low[0] < self.low[0] or high[0] > self.high[0]:  # a larger force: those counted before are below it
+        if low[0] < self.low[0] or high[0] > self.high[0]:  # a new extreme: counted anew, also at the other
             self.at_limit = 0
         self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
         self.at_limit += int(np.count_nonzero((both[0] == self.low[0]) | (both[0] == self.high[0])))

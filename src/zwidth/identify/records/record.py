@@ -117,7 +117,7 @@ class CsvRecord(Record):
             self._copy = writer.copy()
 
     def _parsed(self, rows: int) -> Iterator[Piece]:
-        """Pieces as pandas reads them from the text."""
+        """Pieces of so many rows as pandas reads them from the text. Raises DeviceError for what is no table."""
         import pandas
 
         kinds = {name: str if name in self.text else np.float64 for name in self.names}
@@ -237,7 +237,7 @@ def record_of(columns: Mapping[str, ArrayLike] | Any, wanted: Columns, label: st
 
 
 def _matlab_record(path: Path, head: bytes, wanted: Columns) -> Record:
-    """The record in a .mat file, `head` its first bytes. Raises DeviceError for a format that is not read."""
+    """The record in a .mat file, `head` its first bytes. Raises DeviceError for a format or a size not read."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
@@ -300,8 +300,10 @@ class AveragedRows:
 
 
 def averaged_rows(record: Record, most: int = MOST_ROWS) -> AveragedRows:
-    """The columns of a record in at most so many rows; a record with columns of words keeps all of its rows.
+    """The columns of a record in at most so many rows; a record with columns of words is not averaged.
+    Rows without a number in some column are left out.
 
+    Each time that the rows are halved an odd last one is left out, and in the end what fills no average.
     Memory stays below that of 2 * `most` rows and one piece.
     """
     kept, rows, together, left_out = list[Piece](), 0, 1, 0
@@ -386,7 +388,7 @@ class TableWriter:
         self._close()
 
     def add(self, piece: Mapping[str, NDArray[Any]]) -> None:
-        """Write the next rows."""
+        """Write the next rows; give the copy up where words are too many or the disk is full."""
         if self._stream is None:
             return
         block = np.empty((len(piece[self._names[0]]), len(self._names)))
@@ -489,9 +491,11 @@ class Columns:
             hints = {one: self._other_unit((one,), names) for one in self.optional}
             faults += [f"column {one} is missing{hint}" for one, hint in hints.items() if hint]
         chosen += optional
+        # without "; needed are ...": nothing is needed here
         if twice := header_fault(names, [], chosen).partition(";")[0]:
             faults.append(twice)
         if faults and not any(" is there: " in fault for fault in faults):
+            # of a single name: the part of the sentence that says what separates the cells
             separated = header_fault(names, chosen or ["?"]).partition(": ")[2] if len(names) == 1 else ""
             faults.append(separated or _header_fault(names) or f"needed are {self.listed}")
         return chosen, "; ".join(faults)

@@ -89,8 +89,8 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
     """The sampling of a record with a column time_s, and the check that it is regular.
 
     period   of the computer that is to have written the record [s]; None: any
-    Returns  None for the sampling where there is none: fewer than 100 rows, a time that falls or stands still, or
-             steps of which more than 1 % are off by a fifth
+    Returns  None for the sampling where there is none: fewer than 100 rows, a time that falls or stands still,
+             steps of which more than 1 % are off by a fifth, or another period than the one given
     Raises   DeviceError  for cells that are no numbers
     """
     pieces = record.pieces()
@@ -259,7 +259,8 @@ def check_periods(records: Sequence[Record], samplings: Sequence[SampleTimes], p
 
 
 def check_mass_in_file(name: str, value: float, known: float, unit: str, *, turns: bool) -> list[Check]:
-    """Whether the mass found is of the size that the file gives; [] where the file gives none.
+    """Whether the mass found is of the size that the file gives; [] where the file gives none, or
+    none above 0 was found.
 
     name, unit    of the mass, for messages
     value, known  found, and in the file [kg] or [kg m²]

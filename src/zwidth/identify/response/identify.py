@@ -325,7 +325,7 @@ def _share_explained(response: Response, unseen: SweepBlocks, length: int, perio
     Of the motion itself low frequencies alone would count, at which a free device moves most. The position is
     differenced twice, and both are weighted by a Hann window, since a device that drifts leaks.
 
-    length  of the blocks that are transformed at once, at most [samples]
+    length  of the blocks that are transformed at once, at most [samples];   period  of the loop [s]
     """
     differences = 2  # of the position
     assert response.coherence is not None
@@ -368,7 +368,8 @@ PREDICTED: Final = 0.5  # share of the unseen acceleration, below which a reader
 def check_responses(
     device: Device, responses: Sequence[Response], labels: Sequence[str], names: tuple[str, str]
 ) -> list[Check]:
-    """Whether force and position are in their columns, in their units, and turned alike in all sweeps.
+    """Whether force and position are in their columns, in their units, and turned alike in all sweeps; []
+    where too few frequencies are coherent.
 
     responses  of each sweep;   labels  of their records;   names  of the columns of force and position
     """
@@ -377,6 +378,7 @@ def check_responses(
     f, size = first.frequency[good], np.abs(first.value[good])
     if len(f) < FEWEST:
         return []
+    # lines lie evenly over f: with these weights each octave counts alike
     slope = float(np.polyfit(np.log(f), np.log(size), 1, w=1.0 / np.sqrt(f))[0])
     checks = [order_check(slope, float(f[-1] / f[0]), names), *_check_units(device, f, size)]
     if len(responses) > 1:
@@ -535,7 +537,7 @@ class SweepRange:
 
     @classmethod
     def of(cls, sweep: SweepBlocks, first_levels: int) -> SweepRange:
-        """Read a sweep once.
+        """Read a sweep; its encoder step is that of its first `FIRST` samples.
 
         first_levels  samples among which levels are counted
         """

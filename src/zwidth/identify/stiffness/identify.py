@@ -68,6 +68,7 @@ def _runs_by_drive(
     """The runs of each drive, in the order in which the drives appear.
 
     joint  of all rows, where no column says it; None: of the only drive
+    Raises DeviceError  for a joint that is none, or is given beside a column of it, and for records without rows
     """
     runs: dict[str, tuple[Drive, list[StrokeRun]]] = {}
     for record in records:
@@ -101,7 +102,8 @@ class _Scale:
 
 
 def _identify_drive(device: Device, drive: Drive, runs: list[StrokeRun], side: str, prefix: str) -> Identification:
-    """Check the runs of one drive, fit its spring, and predict what was not fitted.
+    """Check the runs of one drive, fit its spring, and predict what was not fitted. Raises DeviceError for runs at
+    the link without a transmission ratio.
 
     side    "motor" or "link", where the runs were measured;   prefix  of all names where there are several drives
     """

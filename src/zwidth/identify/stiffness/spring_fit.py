@@ -54,7 +54,7 @@ class SpringFit:
     covariance  (p, p) of their errors
     freedom     of Student's distribution for their intervals
     residuals   (n,) torque less the fitted one
-    outliers    (n,) bins that were left out
+    outliers    (n,) bins that were left out as too far from the others
     """
 
     names: tuple[str, ...]
@@ -135,7 +135,8 @@ def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> Sp
 def _best_extension(
     fit: SpringFit, strokes: Strokes, resolution: Resolution, kept: Flags, both_sides: bool
 ) -> SpringFit | None:
-    """The fit with one more parameter that brings most, of those that differ from zero; None if none does.
+    """The fit with one more parameter that brings most, of those that differ from zero; None if none
+    does, or brings enough (`WORTH`).
 
     kept  (n,) bins that are used;   both_sides  whether the spring was bent both ways
     """
@@ -219,7 +220,7 @@ def _dry_friction(x: dict[str, float], strokes: Strokes) -> Floats:
 def _start_and_sizes(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -> tuple[Floats, Floats]:
     """Parameters (p,) where the search begins, and by how much each is likely to differ (p,).
 
-    before  a fit with fewer parameters; None: none yet
+    names   of the parameters;   before  a fit with fewer of them; None: none yet
     """
     span_angle, span_torque = float(np.ptp(strokes.angle)), float(np.ptp(strokes.torque))
     if before is None:
@@ -307,7 +308,8 @@ def _covariance(
 
 
 def _rounding(pseudo: Floats, strokes: Strokes, resolution: Resolution) -> Floats:
-    """Covariance (p, p) by the rounding of the angle: one error for each count and sign of motion.
+    """Covariance (p, p) by the rounding of the angle: one error for each count and sign of motion; 0
+    where no step shows.
 
     pseudo  (p, n) pseudo-inverse of the torque's derivatives
 
@@ -484,6 +486,7 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
             place = float(np.mean(part)) / max(len(angle) - 1, 1)
             reach = 0.5 * abs(float(angle[part[-1]] - angle[part[0]])) if len(part) > 1 else 0.0
             mean_torque, mean_angle = float(np.mean(torque[part])), float(np.mean(angle[part]))
+            # no turn is known before the record
             way = abs(mean_angle - float(angle[start])) if start else np.inf
             columns.append((mean_torque, mean_angle, reach, len(part), sign, number, place, run, way))
         number += 1
