@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import zwidth
 from tests.model.model_cases import KINDS, some_postures
 from tests.systems import random_operator, random_plant
 from zwidth.chart import ALL_NUMBERS, numbers_of_points, stability_chart
@@ -135,3 +136,13 @@ def test_numbers_of_a_held_device_are_those_of_each_chart(changes, held):
                 assert found.largest_damping[k] == pytest.approx(chart.damping_max, rel=1e-9)
                 assert found.area[k] == pytest.approx(chart.stable_area, rel=1e-9)
     assert DOUBTFUL not in numbers[ALL_NUMBERS].status
+
+
+@pytest.mark.parametrize("directions", [(0.0, 1.0), (1.0, 0.0), (0.6, -0.8)])
+def test_places_held_by_a_mass_alone_are_each_place(directions):
+    """Its mass couples the device's free motion with the others, and nothing holds any of them."""
+    device = zwidth.load("five-bar", {"operator.arm_mass_kg": 0.5, "operator.grasp": "rigid"})
+    places = [(0.0, 0.25), (0.03, 0.22), (-0.05, 0.2)]
+    together = device.at(places, directions).measure("stiffness_max").values
+    alone = [device.at(place, directions).chart().stiffness_max for place in places]
+    assert np.abs(together / alone - 1.0).max() < 1e-9

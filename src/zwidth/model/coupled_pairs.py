@@ -53,7 +53,7 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
     M, B, K, ends, known = _plant_matrices(modes, operator)
     # sum of |input| times sum of |output|, see `PolePairs`: shares of parts are told against it
     reach = np.where(known, np.abs(ends).sum(axis=2).prod(axis=0), np.nan)
-    free = _set_aside_free_motions(B, K, ends)
+    free = _set_aside_free_motions(M, B, K, ends, reach)
     N, n = ends.shape[1:]
     companion = np.zeros((N, 2 * n, 2 * n))  # A of (x, x')' = A (x, x')
     companion[:, :n, n:] = np.eye(n)
@@ -113,16 +113,19 @@ def _plant_matrices(
     return M, B, K, ends, known
 
 
-def _set_aside_free_motions(B: Floats, K: Floats, ends: Floats) -> Floats:
+def _set_aside_free_motions(M: Floats, B: Floats, K: Floats, ends: Floats, reach: Floats) -> Floats:
     """Take the motions without stiffness and damping, whose double pole at 0 is known, out of the matrices (in
     place).
 
     Each gets a spring of its own instead, and neither input nor output, so that it has no part in the response.
-    Returns (N,) [1/kg] the sum over these motions of input times output: their response is this over s^2, where M
-    does not couple them with others.
+    Where M couples one with other motions, as the mass of an arm that is held by nothing does, it is no motion of
+    the plant by itself: reach becomes nan.
+    Returns (N,) [1/kg] the sum over these motions of input times output: their response is this over s^2.
     """
     diagonal = np.arange(K.shape[1])
     free = ~(np.abs(K).max(axis=2) > 0.0) & ~(np.abs(B).max(axis=2) > 0.0)
+    coupled = free & (np.count_nonzero(M, axis=2) > 1)
+    reach[coupled.any(axis=1)] = np.nan
     shares = np.where(free, ends[0] * ends[1], 0.0).sum(axis=1)
     stiffest = np.abs(K).max(axis=(1, 2), initial=0.0)
     # stiffer than all others and each other, so that their poles meet none
