@@ -6,7 +6,7 @@ import pytest
 from tests.contact.engine_cases import random_stable_wall, run, spectral_radius, two_mass_loop
 from tests.contact.matrix_power_reference import fine_readings
 from tests.systems import FEATURES, random_loop
-from zwidth.contact import Run, judge_response, simulate, simulate_batch, wall
+from zwidth.contact import Hand, Reach, Run, Tremor, judge_response, simulate, simulate_batch, wall
 from zwidth.loop import (
     AlphaBeta,
     Butterworth,
@@ -17,6 +17,7 @@ from zwidth.loop import (
     SavitzkyGolay,
     WindowedDifference,
 )
+from zwidth.model import Operator
 from zwidth.model.modes import least_deforming_motion
 
 HAS_LONG_DOUBLE = np.finfo(np.longdouble).eps < 1e-18
@@ -189,3 +190,22 @@ def test_a_start_inside_the_wall_moves_on_from_there():
     )
     assert response.penetration[0] == pytest.approx(5e-3, rel=1e-14)
     assert abs(response.truth[-1]) < 5e-4
+
+
+@pytest.mark.parametrize(
+    "hand",
+    [
+        Hand(push=2.0),
+        Hand(push=2.0, ramp=0.03),
+        Hand(push=2.0, tremor=Tremor(1.0, 30.0)),
+        Hand(Operator(0.5, 300.0, 8.0, 3000.0, 5.0), reach=Reach(0.02, duration=0.1)),
+    ],
+    ids=["steady", "ramp", "tremor", "reach"],
+)
+def test_a_motion_is_the_same_whether_the_way_between_samples_is_kept_or_not(hand):
+    runs = [
+        Run(two_mass_loop(period=0.005), wall.values(stiffness=500.0, damping=2.0), hand=hand, start_position=1e-3)
+    ]
+    (kept,) = simulate_batch(runs, wall, duration=0.2, trail=True)
+    (not_kept,) = simulate_batch(runs, wall, duration=0.2)
+    assert np.abs(kept.truth - not_kept.truth).max() < 1e-9 * np.abs(kept.truth).max()

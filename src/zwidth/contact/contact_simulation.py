@@ -473,6 +473,5 @@ def bound_of_run(offset: float, growth: float | None) -> float:
 def needed_substeps(loop: Loop, hand: Hand, substeps: int) -> int:
     """The number of substeps; of a linear device under a steady push only those that a figure needs, as all are
     exact."""
-    steady = hand.reflex is None and hand.tremor is None and hand.reach is None and not hand.ramp
     linear = not set(loop.plant.nonlinear.kinds) - COUNTED
-    return min(substeps, SHOWN_BETWEEN) if steady and linear else substeps
+    return min(substeps, SHOWN_BETWEEN) if hand.is_steady and linear else substeps

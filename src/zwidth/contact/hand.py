@@ -147,6 +147,11 @@ class Hand(Documented):
             raise ValueError(f"a {what} needs an arm; give the hand an operator")
 
     @property
+    def is_steady(self) -> bool:
+        """Whether its force does not change in time by itself, so that a linear motion is exact with any steps."""
+        return self.reflex is None and self.tremor is None and self.reach is None and not self.ramp
+
+    @property
     def push_numbers(self) -> Floats:
         """Numbers (9,) for `hand_force`, PUSH to TREMOR_PHASE: push [N], ramp [s]; distance of the reach times
         stiffness [N] and damping [N s] of the arm, its start and duration [s]; amplitude [N], angular frequency

@@ -108,7 +108,8 @@ def simulate_batch(
 
     runs      of any loops, hands and starts;   environment  the one thing that all of them touch
     duration  of all runs, or of each [s]
-    substeps  between samples; 1 is taken where no plant has a nonlinear part, nor trail or ledger is kept
+    substeps  between samples; 1 is taken where no plant has a nonlinear part, no hand's push changes, and neither
+              trail nor ledger is kept
     progress  called with "simulating", the samples done, and those of all runs
     Returns   one response for each run, in their order
     Raises    ValueError  for a duration or a number of substeps that cannot be meant, starts of a wrong shape
@@ -122,8 +123,9 @@ def simulate_batch(
     # 1e-12: a whole number of periods that rounding has made a little longer gets no sample more
     samples = np.array([1 + ceil(length / T * (1.0 - 1e-12)) for length, T in zip(lengths, period, strict=True)])
     m, S = len(runs), int(samples.max())
-    # nothing is kept between samples, and a linear plant is exact with any number while the push is steady
-    if not trail and not ledger and not any(held_device.elements for held_device in held_devices):
+    # where nothing is kept between samples: a linear plant is exact with any number while the push is steady
+    linear = not any(held_device.elements for held_device in held_devices)
+    if linear and all(run.hand.is_steady for run in runs) and not trail and not ledger:
         substeps = 1
     plants = pack_plants(held_devices, substeps)
     # handle positions of a run: one after each substep
