@@ -493,7 +493,7 @@ def _ends_of_either_sign(document: dict[str, Any], steps: KeyPath, value: float)
         return -turn, turn
     if not unit and size <= 1.0:
         return -1.0, 1.0
-    away = 2.0 * size or typical_size(document, steps)  # not to 0: a vector may not be all zeros
+    away = 2.0 * size or typical_size(document, steps)  # twice: once ends at 0, which no vector may be
     return value - away, value + away
 
 

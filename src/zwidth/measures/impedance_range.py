@@ -252,7 +252,7 @@ def _chart_number(
     none_stable: str = "",
 ) -> MeasureValues:
     """A number of the chart of each point, computed together (`chart.point_chart`); for a point in doubt, and for
-    all where the modes are not in that form, by a chart of its own.
+    all points where `numbers_of_points` gives None, by a chart of its own.
 
     what         STIFFEST, DECAY or ALL_NUMBERS: what of the charts is computed
     number       attribute of `ChartNumbers` that is returned;   alone  computes it at a single point

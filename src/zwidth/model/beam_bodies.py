@@ -327,8 +327,8 @@ def flexible_link(
 ) -> FlexibleLink:
     """The flexible link that takes the place of a rigid one.
 
-    Assumed modes follow the joints: those of a beam clamped at its base where the link is driven or fixed, those
-    of a beam between pins where its joint is passive. Converged results do not depend on that.
+    Assumed modes follow the joints: those of a beam clamped at its base where the link is driven, free or fixed,
+    those of a beam between pins where its joint is passive. Converged results do not depend on that.
 
     link      index of the link, whose tip is the beam's
     modes     of assumed modes in each plane, of twist and of stretch; of finite elements those kept beside the
@@ -407,6 +407,7 @@ def _body(
         except ValueError as error:  # all but the number of modes is known to fit
             raise BeamError(mechanism.links.names[link], "beam.modes", str(error)) from None
     driven = [int(joint) for joint in mechanism.drives.joint]
+    # a driven or a free joint is an independent coordinate, or there is none: a passive one follows the loops
     hub = mechanism.links.joint[link] == FIXED or link in driven or link in mechanism.free
     return assumed_modes(beam, stations, modes, "clamped" if hub else "pinned")
 

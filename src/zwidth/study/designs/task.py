@@ -116,7 +116,7 @@ def _positions(
 ) -> Floats | None:
     """Positions (n, 3) of the shape's points, or the reference [m]; None without a mechanism, and with faults.
 
-    given  the table [task]
+    given  the table [task];   document, device, finer  as for `task_of`;   faults  gets what is wrong with it
     """
     if device.mechanism is None:
         return None
@@ -134,8 +134,8 @@ def _positions(
                 _coordinates_along(span, PER_AXIS if n is None else n, finer)
                 for span, n in zip(box, each, strict=True)
             ]
-            corners = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(box))
-            return np.array([device.position(point) for point in corners.tolist()])
+            grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(box))
+            return np.array([device.position(point) for point in grid.tolist()])
         if "radius_m" in given:
             rings = (RINGS if count is None else count) * finer
             center, radius = device.position(given["center_m"]), float(given["radius_m"])
