@@ -260,7 +260,7 @@ def _largest_stiffnesses_of_patch(
     K, B, inside = patch
     # tops: stiffest wall of the patch at each damping
     tops = np.array([K[column].max(initial=0.0) for column in inside.T])
-    worth = np.flatnonzero(tops > WORTH * tops.max())
+    worth = np.flatnonzero(tops > WORTH * tops.max())  # near enough to the tip; one more is taken on either side
     filled = np.flatnonzero(tops > 0.0)
     filled = filled[(filled >= worth[0] - 1) & (filled <= worth[-1] + 1)]
     some = filled[np.unique(np.linspace(0, len(filled) - 1, min(COLUMNS, len(filled))).astype(int))]
@@ -387,7 +387,7 @@ def measure_tips(
     Of a nonlinear device: from a lower one where that is not stable, and the lowest change of the verdict.
 
     place  extent of the stable walls, by `find_stable_walls`;   box  as there
-    Returns  a point for each damping at which the start is stable
+    Returns  a point for each damping at which the start is stable, its stiffness nan where no edge is found
     """
     least, most = _stiffness_range(box)
     # somewhat below the least stiffness that is measured; the first step of the march is to the tip's
@@ -520,7 +520,7 @@ def march(
 def bisect(
     trial: StabilityTrial, lines: SearchLines, brackets: Brackets, tolerance: Floats, levels: int | None = None
 ) -> Brackets:
-    """Halve the gap between stable and unstable until it is below the tolerance (m,); lines without one stay."""
+    """Halve gaps, stable to unstable, to the tolerance (m,); lines without one stay. levels: as in `observe`."""
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
     while True:
         # 1e-12: nearer than that there is hardly a number between
@@ -555,7 +555,7 @@ def nearest_change(
     Returns       as `brackets`; stable 0 where no stable wall was met
     """
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
-    top, changed = brackets.stable.copy(), np.zeros(len(stable), dtype=bool)
+    top, changed = brackets.stable.copy(), np.zeros(len(stable), dtype=bool)  # top: SHARES are of this
     lanes = np.flatnonzero(stable > 0.0)
     for _ in range(LOWERED):
         if not len(lanes):

@@ -348,8 +348,9 @@ class PredictedGrowth(NamedTuple):
 
 def predicted_growth(loop: Loop, environment: Environment, values: Floats) -> PredictedGrowth:
     """Growth by the eigenvalues of a linear loop; known on the two-sided wall alone, and of linear estimators.
+    Elsewhere it is None, and its frequency 0.
 
-    loop  held by its operator
+    loop  held by its operator;   values  stiffness and damping of the wall first
     """
     if environment is not ENVIRONMENTS["wall"]:
         return PredictedGrowth(None, 0.0)

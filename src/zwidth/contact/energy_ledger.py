@@ -109,6 +109,7 @@ def enter_substep(
 ) -> None:
     """Enter the work [J] done over one substep, between states (R,) before and after.
 
+    d, part  device, and part of the interval, whose loss and work are taken
     command, push  held forces of actuator and hand [N];   forces (E,)  of the elements
     """
     N, n, held = devices.energy.shape[1], devices.size[d], book.work

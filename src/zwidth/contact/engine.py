@@ -208,7 +208,7 @@ def advance_interval(
     """From sample j to the next: first with the command of one sample more of delay, then with the new one. The
     local loop takes its samples in between.
 
-    time     of the sample [s]
+    m        number of the run;   time  of the sample [s]
     signals, added  memory of the computer, and of the forces that it adds beside the wall's
     feedback, memory  the fixed feedback, and what it remembers;   drawn (C,)  room for the encoders' noise
     varies   whether an element changes from substep to substep (VARYING or SAMPLED)
@@ -267,8 +267,8 @@ def run_member(
 
     samples  to be run;   address  of the environment's machine code;   records  are filled in
 
-    For the ledger a second computer reads without steps and noise, and the environment answers once more, to the
-    velocity as it is.
+    For the ledger a second computer reads without steps and noise, and the environment answers twice more: to
+    that place with the second computer's velocity, and with the velocity as it is.
     """
     force, d = environment_at(address), members.device[m]
     computer, plant = computer_at(computers, d), motion_from(devices, members.start[m])
@@ -285,6 +285,7 @@ def run_member(
         has_feedback = has_feedback or feedback.acts[d, part] != 0
     for element in range(devices.kind.shape[1]):
         varies = varies or devices.kind[d, element] in (VARYING, SAMPLED)
+    # of the forces that the computer adds beside the wall's
     added = signals_of(computer, devices.kind.shape[1], devices.kind.shape[1])
     book, stored_at_start = new_ledger(devices, booked), energy_of(devices, d, states)
     for j in range(samples):

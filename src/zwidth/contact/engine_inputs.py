@@ -55,7 +55,7 @@ class HeldDevice:
         self.handle = self.modal_plant.sensor if self.modal_plant.handle is None else self.modal_plant.handle
         self.push = self.handle
         if operator is not None and not operator.rigid_grasp:
-            self.push = self.shapes[-1]
+            self.push = self.shapes[-1]  # the arm behind the grasp is the last coordinate
         self.elements = _passive_elements(self.modal_plant)
         if hand.reflex is not None and operator is not None:
             self.elements.append((VARYING, (ARM,), self.push))

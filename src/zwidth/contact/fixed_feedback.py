@@ -220,7 +220,8 @@ def with_feedback(
 ) -> float:
     """The command of a sample [N], before the force filter: the wall's force, force feedback and feedforward.
 
-    wall, measured  forces of the wall and of the force sensor [N];   reading  [m];   period  T [s]
+    d  index of the computer;   wall, measured  forces of the wall and of the force sensor [N];   reading  [m]
+    sample  its number;   period  T [s]
     """
     command = wall
     if sample == 0:

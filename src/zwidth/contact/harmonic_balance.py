@@ -413,6 +413,7 @@ def with_harmonics(
     Only the limit of the force is taken for nonlinear. Where Newton's method fails, the cycle of as many harmonics
     as it could solve for is returned; the given one where it fails for the first already.
 
+    wall_stiffness, wall_damping  as in `harmonic_balance`
     cycle       by `limit_cycles` of a loop without dry friction, counters and bent springs that act
     force_limit  largest force [N]; None: the smaller of the controller's and the actuator's limits
     Raises      ValueError   where nothing limits the force

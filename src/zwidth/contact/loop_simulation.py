@@ -238,6 +238,7 @@ def _run_arrays(
     for i, run in enumerate(runs):
         held_device = held_devices[index[i]]
         start[i] = start_states(held_device, plants, int(index[i]), *_start(held_device, run))
+    # nan first: no passivity controller
     observers = [np.array([np.nan]) if run.passivity is None else run.passivity.parameters for run in runs]
     width = max(len(numbers) for numbers in observers)
     return RunArrays(

@@ -134,7 +134,8 @@ def step_with_friction(
 ) -> None:
     """Take several substeps under one Coulomb friction and a constant force, which `held_increment` has.
 
-    A, inputs  `PlantArrays.transition`, `inputs`;   level  of the friction [N];   count  substeps
+    A, inputs  `PlantArrays.transition`, `inputs`;   d, part  device, and part of the interval
+    level      of the friction [N];   count  substeps
     The very numbers of `predict_motions`, `solve_forces` and `step`, without asking each time what there is; in so
     short a loop that costs more than the algebra.
     """
@@ -244,7 +245,8 @@ def _motion_without_own_force(
 
 @compiled_inline
 def _element_force(devices: PlantArrays, d: int, part: int, e: int, coulomb: bool, state: PlantState) -> float:
-    """The force of element e under those of all others."""
+    """The force [N] of element e of device d in a part of the interval, under those of all others; `coulomb` as in
+    `solve_forces`."""
     at, inputs = devices.energy.shape[1] + 2 * e, devices.inputs
     place, speed = _motion_without_own_force(devices, d, part, e, state)
     return element_force(

@@ -218,6 +218,7 @@ def equivalent_loop(
 
     Left out are noise, brakes, frictions of level 0, and counters if none of them has steps.
 
+    wall_stiffness, wall_damping  of the wall [N/m], [N s/m]
     force_limit  the smallest limit on the force [N];  offset  see `EquivalentLoop`
     Raises       FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law, and
                                 for a load

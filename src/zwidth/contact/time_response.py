@@ -241,6 +241,7 @@ def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement
         return Judgement(
             judged, float("nan"), _half_peak_to_peak(response.handle), float("nan"), float(touching.mean())
         )
+    # third and last quarter, and second half; before, after: the changes in these quarters
     third, last, half = slice(S // 2, S // 4 * 3), slice(S // 4 * 3, S), slice(S // 2, S)
     # of the place or, with `drifts`, of the velocity
     changes = np.diff(response.truth, n=2 if drifts else 1)

@@ -140,7 +140,8 @@ def touch_step(touch: Touch, ports: Floats, push: float, drawn: Floats, outputs:
 
 @compiled_inline
 def touch_of(counts: Ints, numbers: Floats, memory: Floats) -> Touch:
-    """The device as views of its blocks, see the module; what no period of this kind looks at is empty."""
+    """The device as views of its blocks counts, numbers and memory, whose order and sizes the module gives; what
+    no period of this kind looks at is empty."""
     n, N, E, P, C = counts[SIZE], counts[STATES], counts[ELEMENTS], counts[PARTS], counts[ENCODERS]
     w, k, f, delay = counts[WEIGHTS], counts[FACTORS], counts[FILTERS], counts[DELAY]
     R, F = N + 2 * E, 2 + E

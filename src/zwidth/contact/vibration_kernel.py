@@ -162,6 +162,7 @@ def transition(
     """Transition (M, M) of the loop whose gains are those of a vibration; the velocities (t + 1, n, M) at the
     sample's beginning and at the t times of `plant_steps` [m per sample]; and the commanded force (M,).
 
+    sizes   of the vibration, as `sizes_of` gives them
     passes  share of the force that acts; negative: what its limit lets pass
     states, forces  as `plant_steps` returns them
     """
@@ -296,7 +297,8 @@ def vibration_size(loop: LoopArrays, sizes: Floats, by_velocity: bool) -> float:
 
 @compiled
 def vibrations(loop: LoopArrays, sizes: Floats, size: float, by_velocity: bool) -> tuple[Complexes, Floats]:
-    """All vibrations of this size (see `vibration_size`) of the linear loop that has the gains of `sizes`.
+    """All vibrations of this size (see `vibration_size`) of the linear loop that has the gains of `sizes`, but
+    those that the sensor does not see.
 
     Returns  their roots (k,), and a row of sizes for each
     """

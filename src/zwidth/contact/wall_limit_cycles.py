@@ -130,7 +130,8 @@ def predict_limit_cycles(
 def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str, ...]:
     """Name the parts of a device that depend on the amplitude of a vibration; brakes and noise do not count.
 
-    Raises  what `predict_limit_cycles` raises before it computes
+    offset  as in `predict_limit_cycles`
+    Raises  what that raises before it computes
     """
     check_kind("point", point, OperatingPoint)
     check_arguments(LIMIT_CYCLES, offset=offset)
@@ -243,6 +244,7 @@ def _simulate_large_starts(
 ) -> list[SimulatedVibration]:
     """Simulate from where a force at its limit may keep up a vibration that small ones do not grow into.
 
+    cycles        predicted ones, of which the unstable give starts, too
     largest       motion of the device, beyond which no run starts [m]
     K, B, offset  as in `_simulate_small_start`
     Returns       where each run ends; none where the force has no limit, the wall no spring, or all starts are

@@ -133,6 +133,7 @@ class DesignBatch:
 
         position   (P, 2) or (P, 3), or (..., 2) or (..., 3) of a workspace that has two axes or more; None: the
                    reference of each design
+        direction, assembly, model  as for `Device.at`
         Returns    OperatingPoint of shape (P,) or (P, ...), without P where nothing differs; and marks (P,) of the
                    designs to be asked for alone: there may be a way round to the position, or a reason why not.
                    A position that is certain to be out of reach is marked in `status` alone

@@ -396,7 +396,7 @@ class Device:
     def position(self, position: Position | ArrayLike | None = None, assembly: str | None = None) -> Floats:
         """The requested position of the handle, (..., 3) [m]; left out: that of the file.
 
-        position, assembly  as for `at`
+        position, assembly  as for `at`; the assembly counts for joint angles alone
         Raises  DeviceError   for arguments that do not apply to this device
                 PostureError  (model.posture) for joints that cannot be turned to these angles
         """

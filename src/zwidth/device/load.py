@@ -351,6 +351,7 @@ def build_device(
 ) -> Device:
     """The device of checked sections; their numbers may be arrays over designs (`design_batch`).
 
+    checked, document  as `check` returns them;   label  what messages call the device
     surplus  its drives beyond the mechanism's freedom; None: to be found, of one design
     Raises   DeviceError  for a response that cannot be read or that no operator can hold, and a faulty beam
     """

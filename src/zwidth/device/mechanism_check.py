@@ -64,6 +64,7 @@ def surplus_drives(mechanism: Mechanism) -> tuple[int, ...]:
     if motions.shape[1] >= mech.driven + mech.free:
         return ()
     scaled = motions / mech.unit[0][:, None]
+    # the last unknowns are those of the drives, then the free ones
     first_driven = mech.joint.size - mech.driven - mech.free
     # rows of the unknowns that can move independently: the free ones, then each drive that adds one
     kept = [first_driven + mech.driven + drive for drive in range(mech.free)]

@@ -198,7 +198,8 @@ def _angle_faults(mechanism: dict[str, Any]) -> KeyMessages:
 
 
 def _link_faults(mechanism: dict[str, Any], size: float) -> KeyMessages:
-    """Path and sentence of each mass or inertia of a link that looks too large for a device of this size [m]."""
+    """Path and sentence of each mass or inertia of a link that looks too large for a device of this size [m], and
+    of each mass that no metal would have within the radius of gyration."""
     wrist = table(mechanism, "handle").get("controls") == "orientation"  # which may give no lengths at all
     for path, link in written(mechanism, "links"):
         mass, inertia = float(link.get("mass_kg", 0.0)), _largest_moment(link.get("inertia_kg_m2", 0.0))

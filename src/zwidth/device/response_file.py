@@ -184,7 +184,7 @@ def _check_sweep(path: Path, sweep: float, frequency: Floats, first: Floats) -> 
 
 
 def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[Response]:
-    """What one file holds: a response, several by their `sweep`, or a raw sweep turned into one."""
+    """What one file holds: a response, several by their `sweep`, or a raw sweep turned into one; period T [s]."""
     table = _table(path)
     if "time_s" in table:
         yield _response_of_record(path, table, section, period)
@@ -221,8 +221,8 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
 
 
 def _check_spectrum(path: Path, table: Table, period: float) -> None:
-    """Raise DeviceError for frequencies that do not rise up to half the rate, a coherence out of range, or fewer
-    than six frequencies."""
+    """Raise DeviceError for frequencies that do not rise up to half the rate 1/period [Hz], a coherence out of
+    range, or fewer than six frequencies."""
     frequency, lines = table["frequency_Hz"], table[LINE].astype(int)
     nyquist = 0.5 / period
     low, twice, falling = frequency <= 0.0, np.diff(frequency) == 0.0, np.diff(frequency) < 0.0
@@ -297,7 +297,7 @@ def _check_other_force_rests(path: Path, table: Table, resting: str, excited: st
 
 
 def _check_time(path: Path, table: Table, period: float) -> None:
-    """Raise DeviceError for time stamps that are not those of the loop's samples."""
+    """Raise DeviceError for time stamps that are not those of the loop's samples, every period T [s]."""
     time, lines = table["time_s"], table[LINE].astype(int)
     steps = np.diff(time)
     if len(steps) == 0:

@@ -43,8 +43,10 @@ def validation_messages(
     description: Callable[[KeyPath], str] = schema.key_description,
     unknown: Callable[[KeyPath], str] | None = None,
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Path and sentence of each fault; a key missing only because it is misspelt is reported once.
+    """Path and sentence of each fault; a key missing only because it is misspelt is reported once, and a list that
+    is too short only without its faulty elements not at all.
 
+    document  that was validated
     description, unknown  of files that are no device files: what the key at a path means, "" for nothing; and the
                           sentence on a key that there is not
     """
@@ -126,7 +128,7 @@ def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
             hint = f"; did you mean '{near}'?" if near else ""
             return f"must be {limits['expected_tags'].replace(', ', ' or ')}, got {limits['tag']!r}{hint}"
         case "union_tag_not_found":
-            kinds = sorted(schema.kinds(path[:-1])[1])
+            kinds = sorted(schema.kinds(path[:-1])[1])  # the path ends on the key that names the kind
             return f"is missing or no text; give {' or '.join(map(repr, kinds))}"
         case "tuple_type" | "list_type":
             return f"must be a list, got {quote(got)}{about}"

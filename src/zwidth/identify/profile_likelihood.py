@@ -252,6 +252,7 @@ class _EndSearch:
             self.covariance[i] / self.covariance[i, i], posinf=0.0, neginf=0.0
         )  # how the others move with this one, to first order
         inner, place, outer = 0.0, self.best, np.nan  # steps with a rise below and above the wanted one
+        # rises: step -> root of its rise over the wanted one, which is 1 at the end
         step, rises = width, {0.0: float(np.sqrt(max(self.height - self.least, 0.0) / self.rise))}
         for _ in range(MOST_STEPS):
             step = min(step, bound)

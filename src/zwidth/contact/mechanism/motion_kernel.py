@@ -152,7 +152,8 @@ def set_passive_rates(mech: MechanismArrays, angles: Floats, work: WorkingMemory
 
 @compiled_lean
 def check_state(system: System, memory: Memory, x: Floats, condition: float) -> int:
-    """Status of a state: DONE where the motion can go on from it, else why it cannot.
+    """Status of a state: DONE where the motion can go on from it, else why it cannot; AT_LIMIT plus the link's
+    index where a joint is beyond its limit.
 
     The loops' orientation is compared with that a sample before, since a step may pass a singularity.
     condition  reciprocal condition of the loops, negative where they do not close, as `configure` returns it

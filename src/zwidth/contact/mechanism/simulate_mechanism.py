@@ -475,7 +475,7 @@ def motion_inputs(
 ) -> MotionInputs:
     """Number of samples, push and gravity of a motion. Raises ArgumentError for what cannot be simulated.
 
-    duration  [s];   push, gravity  as in `simulate_mechanism`;   drives  their number
+    duration  [s];   push, gravity  as in `simulate_mechanism`;   drives  their number;   substeps take no part
     """
     # 1e-9: a whole number of periods that rounding has made a little longer gets no sample more
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))

@@ -202,8 +202,8 @@ def solve_friction(
     """Fill `friction` (d,) with what is held over the substep, from the motors' velocities without it at its end.
 
     stages[0] is F without friction, stages[1] the linear motion that follows. The drives move each other, so their
-    frictions are found in turn until they stay. resting (d,): becomes 1 where dry friction has the motor end the
-    substep at rest, else 0.
+    frictions are found in turn until they stay. x, part, h: as in `add_friction`. resting (d,): becomes 1 where
+    dry friction has the motor end the substep at rest, else 0.
     """
     mobility, motor, bristles = memory.mobility, system.motor, memory.bristles
     model, numbers = system.friction_model, system.friction
@@ -239,8 +239,10 @@ def solve_friction(
 def add_friction(
     system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats
 ) -> None:
-    """Find the frictions (d,), let them act over the substep, and add what they do to F in stages[0].
+    """Find the frictions (d,), hold them beside the motors' torques until `end_friction`, and add what they do to
+    F in stages[0].
 
+    x        (N,)  state at the substep's beginning;   part, h  of the sample, and length of the substep [s]
     resting  (d,)  becomes 1 where a motor ends the substep at rest
     """
     stages, E, G, rest = memory.stages, memory.half[part], memory.gain[part], memory.rest
@@ -297,7 +299,9 @@ def step_mechanism(
     """One substep of length h, x (N,) in place, from a configured state; the work done against friction [J], nan
     where the loops do not close.
 
+    part  of the sample, 0 or 1, for whose substeps `prepare` has filled the matrices
     hand  (3,) force at the handle over the substep [N];   `memory.hold` holds the motors' torques
+    trial, friction, resting  (N,), (d,), (d,)  room, as `solve_friction` and `end_friction` use it
     """
     stages, E, G = memory.stages, memory.half[part], memory.gain[part]
     rate, N = memory.rate, x.size

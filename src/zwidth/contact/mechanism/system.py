@@ -107,6 +107,7 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
 
     plant  its full model at the start: damping and lagged dampers are taken from it and kept, in the coordinates
            of joints and motors
+    gravity  (3,) [m/s²];   actuator_lag  time constant [s] with which the motors' torques follow; 0: none
     """
     d, n = len(drives.names), plant.size
     n2 = drives.transmission**2  # brings a motor's numbers to the joint

@@ -181,7 +181,7 @@ def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
 
 def _lower_impossible_moments(spec: Any, label: str) -> list[Finding]:
     """Lower a largest principal moment that is above the sum of the other two to that sum, and return findings
-    that tell it; MuJoCo would refuse it. Raises DeviceError for negative ones."""
+    that tell it where it is more than rounding; MuJoCo would refuse it. Raises DeviceError for negative ones."""
     findings, faults = [], []
     for body in spec.bodies:
         if not body.explicitinertial or spec.compiler.balanceinertia:

@@ -225,6 +225,7 @@ def root_of(text: str, label: str) -> ElementTree.Element:
             raise fail(label, "", "is neither MJCF nor URDF, which are XML; give one of those") from None
         raise fail(label, "", f"is not XML: {reason} in line {line}, column {column + 1}") from None
     if root.tag not in ("mujoco", "robot"):
+        # a name may follow that of its XML namespace, in braces
         other = OTHERS.get(root.tag.rpartition("}")[2], OTHERS.get(root.tag.lower(), ""))
         told = other or f"has the root <{root.tag[:40]}>; MJCF begins with <mujoco>, URDF with <robot>"
         raise fail(label, "", told)

@@ -118,7 +118,8 @@ def _held_place(body: RobotBody) -> Place:
 
 
 def _add_links(tree: LinkTree, index: int, body: RobotBody, parent: str, start: Place, shape: Shape) -> None:
-    """Add to the tree one link for each joint of a body that moves; the last of them carries the body's mass.
+    """Add to the tree one link for each joint of a body that moves, one fixed to `parent` where no joint of its
+    own moves; the last carries the body's mass.
 
     index   of the body;   parent  link that carries it
     start   the body's place in that link's frame, all its joints at coordinate 0
@@ -165,8 +166,8 @@ def _steps(body: RobotBody, shape: Shape) -> Iterator[RobotJoint | Place]:
 
 def split_joint(joint: RobotJoint) -> Iterator[RobotJoint | Place]:
     """A joint of several coordinates as a chain: of a universal joint two that turn; of others the place in the
-    reference posture, and behind it joints of one coordinate at 0: of a free joint three slides, then three turns
-    about x, y, z."""
+    reference posture, and behind it joints of one coordinate at 0: three turns about x, y, z, of a free joint
+    behind three slides."""
     without_spring = replace(
         joint, stiffness=0.0, damping=0.0, coulomb=0.0, armature=0.0, limits=None, second=None
     )
@@ -294,7 +295,7 @@ def merge_universal(robot: Robot, named: set[str]) -> None:
 def section_of(
     robot: Robot, tree: LinkTree, handle: tuple[int, Place], controls: str, drives: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """The table [mechanism] of a device file, without numbers of the reference position.
+    """The table [mechanism] of a device file; its reference is zeros along x, for the caller to replace.
 
     handle   body index and place in that body;   drives  tables of [[mechanism.drives]]
     """

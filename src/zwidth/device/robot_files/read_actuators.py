@@ -155,7 +155,7 @@ def read_equalities(mujoco: Any, model: Any, robot: Robot) -> None:
 
 
 def _closure(mujoco: Any, model: Any, equality: int, name: str) -> RobotClosure:
-    """A connect or weld constraint of MuJoCo as a closure of two bodies.
+    """A connect or weld constraint of MuJoCo as a closure of two bodies, or of those that two sites are on.
 
     `eq_data` of a connect holds the point in the first body's frame, then in the second's; of a weld the point in
     the second body's, then in the first's, the quaternion of the second body in the first at [6:10], and at [10]

@@ -92,7 +92,8 @@ def _body(
 def _inertia(model: Any, i: int, six: Floats | None) -> Floats:
     """Inertia (3, 3) of body number `i` about the centre of mass in the body's axes [kg m²].
 
-    MuJoCo finds principal axes to some ten digits: a matrix that the file gives is taken as it stands there.
+    MuJoCo finds principal axes to some ten digits: a matrix that the file gives is taken as it stands there,
+    unless the compiler has turned or changed it.
     six  Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the file; None, or nan first: it gives no matrix
     """
     R = rotation_of_quaternion(model.body_iquat[i])

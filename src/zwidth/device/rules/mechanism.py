@@ -44,8 +44,8 @@ STIFFNESSES: Final = (
 
 
 def _tree_faults(document: Document) -> KeyMessages:
-    """Path and sentence of links whose names repeat, whose parents do not exist or that are their own ancestors,
-    and of loops and drives whose names repeat."""
+    """Path and sentence of links called base, whose names repeat, whose parents do not exist or that are their own
+    ancestors, and of loops and drives whose names repeat."""
     mechanism = table(document, "mechanism")
     parents: dict[str, Any] = {}
     for index, link in tables(mechanism, "links"):

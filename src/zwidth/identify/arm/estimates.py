@@ -246,6 +246,7 @@ def effective_masses(
     values        (P,) of all parameters, or the base ones and 0 for the others: what the base parameters determine
                   is the same
     known_rotors  (d,) inertias at the joints, n^2 J, of the rotors that are no parameters, others 0 [kg m²]
+    Yields        each mass with its gradient (P,) by the values, None of a motor side of which no rotor is fitted
     """
     posture = point.posture
     assert posture is not None
@@ -343,7 +344,7 @@ def consistent_links(
     G = base.matrix[dynamic]
 
     def residuals(x: Floats) -> Floats:
-        """What the base parameters of coordinates x (count,) miss beta by, whitened, then x over s."""
+        """What the base parameters of coordinates x (count,) miss beta by, whitened, then x over s, here WIDE."""
         return np.concatenate(
             [
                 root_without_friction

@@ -319,7 +319,7 @@ def _source_levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
 
 def _autoregressions(residuals: Sequence[Floats]) -> Floats:
     """Filters (d, t + 1) that leave white noise of each joint's residuals, by Yule and Walker's equations; their
-    order by Schwarz's criterion."""
+    order by Schwarz's criterion, 0 where the samples are too few."""
     count = sum(len(r) for r in residuals)
     most = int(min(MOST_TERMS, count // 20, min(len(r) for r in residuals) // 3))
     d = residuals[0].shape[1]

@@ -86,7 +86,8 @@ class BoundaryModel:
         return self.chords(vector).curve is None
 
     def deviations(self, vector: Floats, scatter: Scatter) -> Deviations:
-        """Deviations of the points from the exact edge for numbers (p,); without an edge, from the origin."""
+        """Deviations of the points from the exact edge for numbers (p,), along what was bisected; of a point whose
+        line does not meet the edge, from the nearest wall of it; without an edge, from the origin."""
         chords = self.chords(vector)
         points = self.points[self.points.on_edge]
         value, frequency = np.full(len(points), np.nan), np.full(len(points), np.nan)
@@ -207,6 +208,7 @@ def _relative_deviations(points: BoundaryPoints) -> Floats:
     if not given.any():
         return np.asarray(trials**-0.5)
     several = trials > 1.0
+    # the range of n readings is, in the mean, twice the quantile of the largest, at Blom's place among them
     quantile = norm.ppf((trials - 0.375) / (trials + 0.25))
     own = np.where(several, width / np.where(several, 2.0 * quantile, 1.0), width * UNIFORM)
     usual = float(np.sqrt(np.mean(own[given] ** 2)))

@@ -157,6 +157,7 @@ def _points_of(record: Record, index: int) -> BoundaryPoints:
     low, high = np.where(tip, stiffness_low, damping_low), np.where(tip, stiffness_high, damping_high)
     if len(crossed := np.flatnonzero(low > high)):
         row = int(crossed[0])
+        # `SPREADS` has the low and the high end of damping, then those of a tip's stiffness
         raise record.fault(
             f"the low end {low[row]:g} is above the high end {high[row]:g}", row, SPREADS[2 * tip[row]]
         )
@@ -184,6 +185,7 @@ def _wall_numbers(record: Record, columns: dict[str, NDArray[Any]], names: tuple
     Raises DeviceError for an infinite or far too large number."""
     name = next(name for name in names if name in columns)
     values = columns[name]
+    # an empty cell, nan, counts as 0 here
     beyond = np.flatnonzero(~(np.abs(np.nan_to_num(values)) <= LARGEST) | np.isinf(values))
     if len(beyond):
         row = int(beyond[0])

@@ -521,8 +521,8 @@ def _details(states: Sequence[_State]) -> dict[str, Any]:
 
 
 def _z_width(states: Sequence[_State]) -> dict[str, float] | None:
-    """Ratio of the impedances with and without the wall, where both are known: the Z-width; None for one state, or
-    where no frequency is in both."""
+    """Ratio [dB] of the impedances with and without the wall, where both are known: the Z-width; None for one
+    state, or where no frequency is in both. states: on before off, if there are both."""
     if len(states) < 2:
         return None
     on, off = (state.impedance for state in states)

@@ -120,6 +120,7 @@ def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedan
     """The impedance at the frequencies below `highest` [Hz] at which the response is no chance."""
     from scipy.stats import f as fisher
 
+    # channel 0 is the force, 1 the position: position by force, and the other way round
     (direct, variance), (inverse, _) = spectra.fit(0, 1), spectra.fit(1, 0)
     H1, H_inverse = direct[:, 0], inverse[:, 0]
     # so that no frequency of all passes by chance, with 95 %

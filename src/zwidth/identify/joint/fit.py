@@ -390,7 +390,7 @@ class Arrow:
         """
         number_size = np.sqrt(np.maximum(np.diag(self.own), 1e-300))
         start_size = np.sqrt(np.maximum(np.diagonal(self.starts, axis1=1, axis2=2), floor))
-        diagonal = 1.0 + ridge + 1e-12
+        diagonal = 1.0 + ridge + 1e-12  # solvable without a ridge, too
         N = self.own / np.outer(number_size, number_size) + (diagonal - 1.0) * np.eye(len(number_size))
         starts = self.starts / (start_size[:, :, None] * start_size[:, None, :]) + (diagonal - 1.0) * np.eye(2)
         mixed = self.mixed / (number_size[:, None] * start_size[:, None, :])

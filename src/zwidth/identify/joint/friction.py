@@ -137,7 +137,8 @@ def _sum_estimate(
 
 
 def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
-    """Dry and viscous friction: what the file holds, then both directions, the bias, and a spring."""
+    """Friction as the file holds it, the same both ways, with the bias (of motion one way: viscous friction
+    alone); then that of each direction that moves, and the spring where one was fitted."""
     both = fitted.forward and fitted.backward
     estimates = []
     if both:
@@ -190,7 +191,8 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
 
 
 def mass_estimates(fitted: FittedJoint) -> list[Estimate]:
-    """The mass and the delay of the force, which driven motion tells; [] of free motion."""
+    """The mass, nan and marked as not told where the fit does not tell it, and the delay of the force; [] of free
+    motion."""
     if not fitted.motion.driven:
         return []
     delay = fitted.fit.interval(ONE[DELAY])
@@ -386,7 +388,7 @@ def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
 
 
 def _force_remark(joint: Joint, name: str) -> str:
-    """Which force was used, and what that means."""
+    """Which force was used, and what that means; name: its column, "" of free motion."""
     if not name:
         return "free motion: friction follows only as a ratio to the mass"
     if name == "current_A":
@@ -433,8 +435,8 @@ def compare_with_command(motion: JointMotion) -> Comparison | None:
         moved = np.concatenate([command[LATEST - shift : len(command) - 2 - shift] for _, command in pairs])
         if len(moved) < 10 or np.std(moved) == 0.0 or np.std(measured) == 0.0:
             return None
-        slope = float(np.cov(moved, measured)[0, 1])
-        correlations_and_gains[row] = slope / (np.std(moved) * np.std(measured)), slope / np.var(moved)
+        covariance = float(np.cov(moved, measured)[0, 1])
+        correlations_and_gains[row] = covariance / (np.std(moved) * np.std(measured)), covariance / np.var(moved)
     best = int(np.argmax(correlations_and_gains[:, 0]))
     inner = min(max(best, 1), len(shifts) - 2)
     before, here, after = correlations_and_gains[inner - 1 : inner + 2, 0]

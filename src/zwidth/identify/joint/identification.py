@@ -310,8 +310,8 @@ def _usual_mean_square(fit: JointFit, motion: JointMotion) -> float:
 def _fit_seen_windows(
     windows: Windows, motion: JointMotion, numbers: JointNumbers, spring: bool | None
 ) -> tuple[JointFit, tuple[float, ...]]:
-    """The fit without windows that follow no such model, and with a spring where there is one; and the times of
-    the windows that were left out [s].
+    """The fit without windows that follow no such model, and with a spring and a drift of the bias where these are
+    shown; and the times of the windows that were left out [s].
 
     spring  whether one acts; None: where the data show one
     """

@@ -25,8 +25,8 @@ def flow(
 ) -> tuple[float, float, float, float, float, float]:
     """Transition of position and velocity over a time h [s], and what a unit force held meanwhile adds to them.
 
-    m x'' + b x' + k x = f;  exp(A h) by its series after halving h, which is exact for any sign and size of b and
-    k, joined again by squaring.
+    m x'' + b x' + k x = f, of mass, damping and stiffness;  exp(A h) by its series after halving h, which is exact
+    for any sign and size of b and k, joined again by squaring.
     Returns  the four entries of exp(A h) by rows, and the two of its integral times (0, 1/m)
     """
     rate, square = damping / mass, stiffness / mass

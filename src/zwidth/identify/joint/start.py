@@ -74,7 +74,11 @@ def weighted_balance(
 
 def force_balance_rows(windows: Windows, size: int, step: float, moving: float) -> tuple[Floats, Ints, Floats]:
     """The motion's side of `weighted_balance`: its rows (s, 5), the samples (s, size) of each, and its sampling
-    period (s,) [s]."""
+    period (s,) [s].
+
+    size    of a segment [samples], with the next one half of it later;   step  of the readings [m or rad]
+    moving  share of a segment that must be motion, else it is left out
+    """
     weight, slope, bend = weighting(size)
     reach = max(size // 8, 1)
     starts = [
@@ -189,8 +193,8 @@ def search_guess(
     """Numbers and starts close to those that predict the motion best.
 
     Short windows forgive a wrong guess, for the start of each is its own; the longer ones then begin where those
-    have led. Of several first guesses that which does best in short windows is followed first, the others only
-    where it leaves more than the noise.
+    have led. Several first guesses are followed in the order of `_guesses`, each only where those before it leave
+    more than the noise and no two of them have led to one place; the best is taken.
     numbers  which are free and which are tied; those that are fixed keep their values
     step     of the encoder;   noise  standard deviation of the readings' noise, steps included [m or rad]
     most     guesses that are followed
@@ -277,7 +281,7 @@ def _numbers_of_bursts(windows: Windows, share: float) -> Floats:
     )
     moved = max(float(np.quantile(travels, 0.8)), 1e-300)
     # speeded up by the excess of force for half a burst, and slowed down by it: travel is excess burst^2 / (4 m),
-    # the excess at least a tenth of the largest force
+    # the excess at least a tenth of the largest force; the delay begins at one sample
     return np.array(
         [max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T, 0.0, 0.0, 0.0]
     )

@@ -107,7 +107,7 @@ def _saturation_check(source: Source, levels: Levels, limit: float) -> Check:
 
 
 def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
-    """Check that enough lines are excited.
+    """Check that enough lines are excited; label: what the record is called.
 
     Returns  the check, and which lines (n,) are excited
     """
@@ -244,6 +244,7 @@ def sign_and_unit_checks(
             reason = (
                 f"{where} the response is {size:.4g} times that of the device file: is the position in {unit}?"
             )
+            # the entries of a factor below 1 speak of the force too, and do not end on a unit of the position
             if not unit.endswith("s"):
                 reason = f"{where} the response is {size:.4g} times that of the device file: is {unit}?"
             checks.append(Check("units", False, reason + " Columns are in N, m, N m, rad."))

@@ -170,7 +170,7 @@ def _check_options(
 def _checked_sources(
     device: Device, point: OperatingPoint, records: Sequence[Record]
 ) -> tuple[list[Source], list[Check]]:
-    """The records of the loop's sampling as sources, at its exact period, kept where short; the check of each."""
+    """Records of the loop's sampling as sources, at its exact period, in memory if short; the check of each."""
     sources, checks = list[Source](), list[Check]()
     for record in records:
         sampling, check = check_sampling(record, point.loop.period)

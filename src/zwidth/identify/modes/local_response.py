@@ -404,7 +404,8 @@ class RecordResponse:
 def response_in_bands(record: BandedRecord) -> RecordResponse:
     """The response that the sums in `record` hold, as rows that a model is fitted to.
 
-    The noise of a band is what the five numbers leave of its lines, averaged over a few bands about it.
+    The noise of a band is what the five coefficients of `_solve_band` leave of its lines, averaged over a few
+    bands about it.
     Raises ValueError  where no band has lines enough
     """
     sums, where = record.sums, record.where

@@ -342,7 +342,7 @@ def modal_intervals(data: RecordResponse, fit: ModalFit, *, profiled: bool = Tru
         # the residues were fitted, too, and take as many residuals
         effective_count=rows * (rows - len(fit.residues)) / rows,
     )
-    step = 1e-6
+    step = 1e-6  # of the differences that give the derivatives
     modelled = fit.columns(found.values, data.theta)
     by_vector = list[Floats]()
     for i in range(len(start)):
@@ -471,7 +471,7 @@ class _RowsOfColumns:
 def _held_responses(
     pairs: Sequence[tuple[float, float]], period: float, delay: float, theta: Floats, velocity: float = 0.0
 ) -> Complexes:
-    """Held and sampled responses (n, c) of 1/(s^2 + 2 a s + w^2), of c pairs a, w^2, at angles (n,).
+    """Held and sampled responses (n, c) of 1/(s^2 + 2 a s + w^2), of c pairs a, w^2, at angles theta (n,).
 
     period    of the loop [s];   delay  [samples]
     velocity  factor of the velocity, which is given in place of the motion; 0: the motion

@@ -240,9 +240,10 @@ def _elements(
 
     key   of the matrix in the file;   full  paths that are named, of which others are left out; (): none is
 
-    A spring between two coordinates is four entries of the matrix, which go together; so are a damper and, without
-    the signs, a coupled mass. What is 0 in the file is not there, but for a damper beside each spring: to say that
-    there is none is a measurement, too. Raises DeviceError where a spring or damper is negative.
+    A spring or damper between two coordinates is four entries of the matrix, which go together, a coupled mass two
+    of one sign. What is 0 in the file is not there, but for a damper beside each spring between
+    coordinates, and that of a single coordinate, both without a loss factor: to say that there is none is a
+    measurement, too. Raises DeviceError where a spring or damper is negative.
     """
     name, _ = MATRICES[key]
     matrix, n = getattr(plant, name), plant.size

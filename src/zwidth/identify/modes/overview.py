@@ -49,7 +49,8 @@ class Survey:
 def survey_of(sources: Sequence[Source], segment: int | None, progress: Progress | None) -> Survey:
     """Read all records once.
 
-    segment  samples in a segment of the averaged spectra; None: 15 in the longest stretch, or the force's period
+    segment  samples in a segment of the averaged spectra; None: 15 in the longest stretch, or the force's period,
+             but LONGEST_SEGMENT at most
     """
     longest = max((min(one.sampling.longest, BLOCK) for one in sources), default=0)
     first = next((one.first() for one in sources if one.first() is not None), None)

@@ -81,7 +81,7 @@ def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period
     low, high = _search_bounds(model, period)
     # 1e-300: the logarithm of 0, which is clipped to the bounds
     start = np.clip(model.vector(np.maximum(model.start, 1e-300)), low, high)
-    # the delay begins at that of the modes
+    # the delay, the one number in s that may be 0, begins at that of the modes
     timed = [i for i, one in enumerate(model.quantities) if not one.positive and one.unit == "s"]
     if timed and modal.count:
         start[timed[0]] = np.clip(modal.delay, 0.0, high[timed[0]])
@@ -218,7 +218,7 @@ class _Search:
         peaks = self.modal.rates[:, None] * self.period * np.array(ABOUT)
         lowest, highest = self.data.theta.min(), self.data.theta.max()
         theta = np.sort(np.append(np.geomspace(lowest, 0.99 * highest, POINTS), peaks.ravel()))
-        theta = theta[theta < 0.999 * np.pi]
+        theta = theta[theta < 0.999 * np.pi]  # peaks above half the sampling rate are left out
         wanted, rates = self.modal.response(theta), self.modal.clear_rates
 
         def remainder(x: Floats) -> Floats:

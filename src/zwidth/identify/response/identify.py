@@ -60,6 +60,7 @@ def identify_response(
     checks, sweeps = _checked_sweeps(records, period)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
+    # once: each frequency is there at one time only, so that all samples are fitted
     fitted, once = _fitted_samples(sweeps)
     length = block_length(fitted, segment)
     try:
