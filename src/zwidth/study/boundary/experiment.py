@@ -117,7 +117,7 @@ def run_experiment(
     journal = journal or Journal(None, "")
     report = progress or (lambda stage, done, of: None)
     subjects = _subjects(operator, plan)
-    first = _stability_trial(loop, operator, plan)
+    first = _stability_trial(loop, operator, plan)  # as planned, nothing varied
     report_search = partial(report, "looking for stable walls")
     place = StableExtent(
         *journal.get_or_compute("place", lambda: _field_values(find_stable_walls(first, plan.box, report_search)))
@@ -159,7 +159,8 @@ def _with_visible(loop: Loop, plan: Plan) -> Plan:
 
 
 def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, ...]:
-    """One operator for each subject of the plan; (None,) without an operator."""
+    """One operator for each subject of the plan: of one subject `operator` himself, of several varied ones;
+    (None,) without an operator. Raises ArgumentError where a plan needs one: for several subjects, or a reflex."""
     if operator is None:
         if plan.subjects > 1 or plan.reflex:
             argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
@@ -196,7 +197,10 @@ def _stability_trial(
     seed: int = 0,
 ) -> StabilityTrial:
     """The trial of a plan, with its disturbance, speed and push times `factors`, in this order; a reflex acts from
-    half the push on."""
+    half the push on.
+
+    seed  of the encoders' noise
+    """
     disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
     reflex = None
     if plan.reflex and operator is not None:
@@ -262,7 +266,7 @@ def _combine_trials(
         for point in points:
             chosen = point.damping if point.edge == "tip" else point.stiffness
             edge_points = by_edge.setdefault((point.edge, chosen), [])
-            if point.unstable_behaviour is not None:
+            if point.unstable_behaviour is not None:  # else this trial found no edge here
                 edge_points.append(point)
     order = {"lower": 0, "upper": 1, "tip": 2}
     combined = []

@@ -41,7 +41,8 @@ Reader = Callable[[str], tuple[Any, str]]
 
 
 def wall_number(text: str) -> tuple[float, str]:
-    """Read a wall's stiffness or damping; returns the number, and what is wrong with it ("" if nothing)."""
+    """Read a wall's stiffness or damping from the text of a cell; returns the number, and what is wrong with it
+    ("" if nothing)."""
     try:
         number = float(text)
     except ValueError:

@@ -34,7 +34,7 @@ class EvaluationJob:
     """Designs as cells: the values of all columns, at each point and in each circumstance.
 
     sweep    of all designs, each as often as there are members, one after another
-    members  circumstances in which each design is judged
+    members  circumstances of each design, their number: each operator, with it as it is and each produced device
     """
 
     sweep: SweepJob
@@ -108,9 +108,10 @@ class DesignJudgement:
         return np.clip(costs, -LARGEST, LARGEST)
 
     def violations(self, problem: Problem) -> Floats:
-        """By how much each demand (k, d) is violated, as a share of its bound, and last whether an objective has
-        no value; 0 where it is kept. What has no value counts more than any violation, and the more points are
-        without the more it counts."""
+        """Violations (k, d + 1) of k designs: of each of d demands as a share of its bound, at most MOST_VIOLATED,
+        and last of the objectives, which is above 0 only where one has no value. What is kept has 0.
+
+        What has no value counts more than any violation, and the more points are without the more it counts."""
         violated = np.zeros((len(self.values), len(problem.demands) + 1))
         for n, demand in enumerate(problem.demands):
             margin = margins(self.values[:, demand.column], demand.bound, demand.at_least)
@@ -162,11 +163,13 @@ class Judge:
         """The job that computes designs, each by the values of its variables: held by each operator in turn, as it
         is and then as it is produced."""
         members, devices = self.problem.members, self._devices
+        # path or circumstance -> its value in each design
         columns = {
             key: list(values)
             for n, variable in enumerate(self.problem.variables)
             for key, values in variable.columns([design[n] for design in designs])
         }
+        # the same -> of each design the values in its devices: as it is, then as they are produced
         each = {key: [[value] * devices for value in values] for key, values in columns.items()}
         if self._changes is not None:
             each |= self._produced(self._changes, columns, len(designs))
@@ -183,11 +186,13 @@ class Judge:
     def _produced(
         self, changes: MemberChanges, columns: dict[str, list[Any]], count: int
     ) -> dict[str, list[list[Any]]]:
-        """Path of each number with a tolerance -> for each design the number as it is, then as it is produced.
+        """Path of each number that differs, with a tolerance or tied to one -> for each design the number as it
+        is, then as it is produced.
 
-        columns  path -> value of each of `count` designs, of the numbers that designs set
+        columns  path or circumstance -> its value in each of `count` designs, of all that designs set
         """
         document = self.problem.study.device.document
+        # a number may be written differently by its tolerance and by the study: path in full -> path in `columns`
         variables = {address.resolve(document, key): key for key in columns if key not in CIRCUMSTANCES}
         produced: dict[str, list[list[Any]]] = {}
         for design in range(count):
@@ -245,8 +250,9 @@ class Judge:
         """Value and status of a column from its `cells` (members, w) and their status, members as in
         `_cells_by_column`.
 
-        Without a statistic a column has one value a member, its first entry, and the worst member counts. With
-        one, the statistic is over all members and points.
+        Without a statistic a column has one value a member, its first entry, and the worst member counts; it has
+        none where one member has none. With one, the statistic is over all members and points; of a sweep that
+        must be complete, as of a task, it has none where one of these has none.
         """
         if column.statistic is None:
             cells, status = cells[:, :1], status[:, :1]
@@ -264,13 +270,16 @@ class Judge:
 
 
 def _three_designs(study: Study) -> Study:
-    """The study with three designs, at the ends and in the middle of its bounds: checks need no more."""
+    """The study with three designs, at the ends and in the middle of its bounds: checks need no more. Catalogues
+    are left out, whose columns are checked as they are read; a study that varies nothing else is returned as it
+    is.
+    """
     from zwidth.study.optimisation.search import values_at
 
     axes = study.sampling.axes
-    corners = values_at(axes, np.array([0.0, 0.5, 1.0])[:, None] * np.ones(len(axes)))
+    designs = values_at(axes, np.array([0.0, 0.5, 1.0])[:, None] * np.ones(len(axes)))
     listed = tuple(
-        replace(axis, values=tuple(row[n] for row in corners), parts=())
+        replace(axis, values=tuple(design[n] for design in designs), parts=())
         for n, axis in enumerate(axes)
         if not axis.parts
     )

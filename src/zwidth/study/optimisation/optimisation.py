@@ -144,8 +144,8 @@ class Optimisation(Result):
 
     @property
     def reason(self) -> str | None:
-        """Why there is no front: an objective without a value, or the demands that designs fail; None where there
-        is one."""
+        """Why there is no front: an objective without a value, or the demands that designs fail; or why the front
+        tells nothing: an objective that is infinite in all of it. Else None."""
         for objective in self.problem.objectives:
             column = self.problem.columns[objective.column]
             if len(self.front) and np.isinf(self.values[:, objective.column]).all():
@@ -159,7 +159,7 @@ class Optimisation(Result):
         records = sorted(self.demands, key=lambda one: one.kept)
         if not records:
             return "no design tried has a value in every objective"
-        first = records[0]
+        first = records[0]  # the demand that the fewest designs keep
         column = self.problem.columns[first.demand.column]
         if np.isnan(first.best):
             return self._with_cause(
@@ -194,7 +194,8 @@ class Optimisation(Result):
 
     @cached_property
     def not_judged(self) -> tuple[NotJudged, ...]:
-        """Designs without values because they failed, or ran out of time; they keep no demand."""
+        """Designs without a value in some column because they failed, and those because they ran out of time; they
+        keep no demand on that column."""
         lost = []
         for status in GIVEN_UP:
             count = int((self.judgement.status == status).any(axis=1).sum())
@@ -321,7 +322,7 @@ class Optimisation(Result):
 
 def _end_reached(axis: Axis, share: float) -> list[str]:
     """A sentence in a list: which end of its range, or of its listed numbers, a variable has at a share; []
-    between them, or for what has no order.
+    between them, or for what has no order or a single value.
 
     >>> _end_reached(Axis("a", (3.0, 1.0, 2.0)), 0.1), _end_reached(Axis("a", (), (0.0, 1.0)), 0.5)
     (['a at the largest of its values'], [])
@@ -340,8 +341,8 @@ def _end_reached(axis: Axis, share: float) -> list[str]:
 
 
 def undominated(costs: Floats) -> Ints:
-    """Designs of which no other is as good in every objective and better in one, in their order; of equal ones the
-    first.
+    """Indices (k,) of the designs of which no other is as good in every objective and better in one, ascending; of
+    equal ones the first.
 
     costs  (k, m)  less is better; a row with nan is left out
 
@@ -353,7 +354,7 @@ def undominated(costs: Floats) -> Ints:
         return known
     _, first = np.unique(costs[known], axis=0, return_index=True)
     rows = known[np.sort(first)]
-    # by falling sum nothing later can dominate what is kept
+    # in order of a rising sum nothing later can dominate what is kept
     order = rows[np.argsort(costs[rows].sum(axis=1), kind="stable")]
     kept: list[int] = []
     for row in order.tolist():
@@ -386,8 +387,9 @@ def knee(costs: Floats) -> int:
 
 
 def spread_out(costs: Floats, most: int) -> Ints:
-    """At most so many designs of a front, spread over it: the ends of each objective, the knee, then always the
-    one farthest from those taken, in the order of the first objective.
+    """Indices of at most so many designs of a front, spread over it: the best in each objective, the knee, then
+    always the one farthest from those taken; in the order of the first objective. Fewer where all others equal
+    some that are taken.
 
     costs  (k, m)  of a front
     """
@@ -497,7 +499,7 @@ def simulate_front_contact(problem: Problem, design: dict[str, Any], cells: Sequ
     """Simulate a wall of a design where the first objective is worst.
 
     The wall is the study's wanted one, or, where it names none, one of 90 % of the largest stiffness there, at
-    that wall's damping.
+    that wall's damping. Where nothing can be simulated the reason is returned.
 
     design  path -> value of each number and circumstance
     cells   (columns, w)  values at all points, member by member

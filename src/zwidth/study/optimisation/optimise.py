@@ -97,6 +97,7 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
             break
     searched = spent
     best = archive.front()
+    # infinite costs, held as LARGEST, cannot be polished
     if len(best) and (np.abs(archive.judgement.costs(problem)[best]) < LARGEST).all():
         costs = archive.judgement.costs(problem)[best]
         chosen = archive.best_apart() if single else best[spread_out(costs, problem.front)]
@@ -137,7 +138,8 @@ class _Archive:
     @property
     def question(self) -> str:
         """Fingerprint of all that the jobs follow from: the variables with their bounds, what the designs are
-        judged by, and how they are searched."""
+        judged by, and how they are searched. Device, task and circumstances are in that of any design's job; the
+        design in the middle of the bounds stands for all."""
         problem = self.problem
         (middle,) = values_at(problem.variables, np.full((1, len(problem.variables)), 0.5))
         return fingerprint(
@@ -305,7 +307,8 @@ def device_files(found: Optimisation) -> Iterator[tuple[str, str]]:
     comments, the changes of `set`, and the design's numbers, whose sources say where they come from.
 
     Position, direction, assembly and operator, of the study or of the design, go into the file too. What has no
-    place there, such as a model, is said in a comment at its beginning.
+    place there, such as a model, is said in a comment at its beginning; and so is where a design without numbers
+    comes from.
     """
     study = found.problem.study
     stem = _file_stem(study)
@@ -361,7 +364,8 @@ def _source_text(study: Study) -> str:
 
 def _operator_changes(found: Optimisation, settings: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield path and value of the changes that give a device file the operator of the design or of the study; the
-    operators of a task are in no file.
+    operators of a task are in no file. The file's own operator is taken out first. Nothing is yielded where
+    neither design nor study names one.
 
     settings  of the design
     """

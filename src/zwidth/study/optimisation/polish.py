@@ -103,7 +103,9 @@ def polish(
         if len(weights) == 1 and spent > TRIED * budget:
             pending = [min(pending, key=lambda one: one.judgement.costs(problem)[0, 0])]
         probing = bool(pending[0].probing)
+        # designs judged for each: probes; else the neighbours of at most two that join its bundle, and its trials
         needed = around * len(PROBES) if probing else 2 * around + len(LENGTHS)
+        # those that go on as the first does, by probes or by steps; the others wait
         pending = [one for one in pending if bool(one.probing) == probing][: (budget - spent) // needed]
         if not pending:
             break
@@ -123,8 +125,8 @@ def polish(
 
 
 def _extend_bundles(problem: Problem, designs: list[_Design], free: Ints, judge: Judges) -> int:
-    """Add to each bundle the designs that are to join it, with their derivatives. Returns the number of designs
-    judged."""
+    """Add to each bundle the designs that are to join it (`joining`), with their derivatives by the `free`
+    variables; the oldest beyond KEPT leave it. Returns the number of designs judged, neighbours of these."""
     joining = [(one, *new) for one in designs for new in one.joining]
     if not joining:
         return 0
@@ -208,9 +210,10 @@ def gradients(shares: Floats, free: Ints, here: Floats, around: Floats) -> Float
 
 
 def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats | None:
-    """The step (f,) that the linear program takes; None where none makes the design better.
+    """The step (f,) that the linear program of this file takes; None where none makes the design better.
 
-    Where the bundle allows none, D shrinks, and designs farther away leave the bundle, until one is found.
+    Where the bundle allows none, D (`one.reach`) shrinks, and designs farther away than NEAR D do not count,
+    until one is found or D is below SMALLEST.
 
     free     (f,)  indices of the free variables
     weights  (m,)  as for `polish`
@@ -235,6 +238,7 @@ def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats
                 rows.append(np.column_stack([slope / size, np.zeros(len(here))]))
                 limits.append((demand.sign * demand.bound - here - slope @ away) / size - one.bend * one.reach**2)
         A, b = np.concatenate(rows), np.concatenate(limits)
+        # what has no value or derivative demands nothing
         known = np.isfinite(A).all(axis=1) & np.isfinite(b)
         box = [(max(-one.reach, -share), min(one.reach, 1.0 - share)) for share in x]
         found = linprog(objective, A_ub=A[known], b_ub=b[known], bounds=[*box, (0.0, None)], method="highs")
@@ -278,7 +282,8 @@ def _trials(shares: Floats, free: Ints, step: Floats) -> Floats:
 
 
 def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement, weights: Floats) -> None:
-    """Move a design to the best of those tried, if it is better; choose its next step, probes and bundle.
+    """Move a design to the best of those tried, if it is better; choose its next step, or its next probes and
+    whether it is done, and what joins its bundle.
 
     tried, judged  (n, v) shares, from the longest step to the shortest, and their judgement
     weights        (m,) as for `polish`

@@ -150,6 +150,7 @@ def problem_of(study: Study) -> Problem:
     given = table(study.document, "optimise")
     faults: TableFaults = []
     task = study.task
+    # the force that the task demands is that of the wall, where the study gives it none
     if task is not None and study.wall.force is None and (held := task.demands.get("continuous_force_N")):
         study = replace(study, wall=replace(study.wall, force=held))
     found = _Requests(study.document, study.user_measures, faults)
@@ -193,7 +194,7 @@ class _Requests:
     user_measures  a user's measures by name
     faults         gets what is wrong
 
-    columns, paths       as in `Problem`, but for moments
+    columns, paths       as in `Problem`, but measures of a device that turns are not yet about moments
     objectives, demands  those without a fault
     """
 
@@ -238,7 +239,8 @@ class _Requests:
         return self.columns.index(column)
 
     def _read_objectives(self, given: dict[str, Any]) -> None:
-        """Take the objectives from the table [optimise]."""
+        """Take the objectives from the table [optimise]; a fault where it has none, unless a misspelt key, or a
+        table that is none, hides them: the schema reports those."""
         for name, goal in table(given, "objectives").items():
             if goal in ("max", "min") and name:
                 better: Better = "higher" if goal == "max" else "lower"

@@ -30,9 +30,10 @@ CHOSEN_ANEW: Final = 0.5  # of the variables in pieces that change, how many jum
 def generations(
     problem: Problem, budget: int, first: Floats
 ) -> Iterator[tuple[Floats, Callable[[Floats, Floats], None]]]:
-    """Generations of designs to judge, until the problem's budget has been asked for.
+    """Generations of designs to judge, until the problem's budget has been asked for. They end before where every
+    combination of pieces has been tried, or the function yielded was not called.
 
-    budget  designs within which the search should be done, for the size of the generations
+    budget  designs within which the search should be done: sizes the generations, and cuts the one that reaches it
     first   (k, v)  shares of designs that the first generation holds
     Yields  shares (n, v), and a function to be called with their costs (n, m) and their violations (n,),
             before the next generation is asked for
@@ -91,7 +92,7 @@ def _repair(problem: Problem) -> Any:
     from pymoo.core.repair import Repair
 
     class Settled(Repair):  # type: ignore[misc]
-        """Moves shares of variables in pieces to the middle of their piece."""
+        """Moves shares into 0 to 1, and those of variables in pieces to the middle of their piece."""
 
         def _do(self, _: Any, X: Floats, **__: Any) -> Floats:
             """The designs X (n, v), by shares, as they may be."""
@@ -163,7 +164,7 @@ def value_at(axis: Axis, share: float) -> Any:
         return axis.values[place] if axis.span is None else ceil(axis.span[0]) + place
     assert axis.span is not None
     low, high = axis.span
-    if share in (0.0, 1.0):
+    if share in (0.0, 1.0):  # the bounds without rounding
         return high if share else low
     value = exp(log(low) + share * (log(high) - log(low))) if axis.log else low + share * (high - low)
     return float(min(max(value, low), high))

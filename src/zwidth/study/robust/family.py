@@ -204,6 +204,7 @@ class Family:
             return together[place].loop
         document = self.document(point)
         if self._ungripped_plant is not None:
+            # only the operator differs: he is attached to the plant that all members share
             held = self._point_with_operator(document)
             if held is not None:
                 return Loop(held.attach_operator(self._ungripped_plant), held.computer)
@@ -232,7 +233,7 @@ class Family:
             raise DeviceError(faults)
 
     def path_faults(self) -> list[RangeFault]:
-        """What is wrong with each range by itself."""
+        """What is wrong with each range by itself, in the hands of any operator, and paths given twice."""
         faults = [fault for one in self.ranges if (fault := one.fault()) is not None]
         paths = [one.path for one in self.ranges]
         faults += [
@@ -246,7 +247,8 @@ class Family:
         return list(dict.fromkeys(faults))
 
     def faults(self) -> list[RangeFault]:
-        """What is wrong with the ranges: each by itself, then at its two ends with the others in their middle."""
+        """What is wrong with the ranges: each by itself; if nothing is, then at its two ends with the others in
+        their middle, in the hands of each operator."""
         faults = self.path_faults()
         if faults:
             return faults
@@ -266,7 +268,8 @@ class Family:
 
 
 def build_together(family: Family, members: Sequence[FamilyMember]) -> list[BuiltDesigns]:
-    """The members that can be built together, by their places among these. The others are to be built alone.
+    """The members that can be built together, in groups whose `rows` are their places among these. The others are
+    to be built alone.
 
     `Family.loop` finds them built until the next call.
     """
@@ -285,7 +288,7 @@ def build_together(family: Family, members: Sequence[FamilyMember]) -> list[Buil
 
 
 def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
-    """The fault of a path that leads to no real number, in a list; [] if it leads to one."""
+    """The faults of a range's path that leads to no real number; [] if it leads to one, be it set or left out."""
     try:
         steps = address.resolve(document, one.path)
     except DeviceError as error:
@@ -375,6 +378,7 @@ class MeasuredFamily:
         document = self.family.held_documents[0]
         known = {fault.path for fault in faults}
         for one in self.family.ranges:
+            # (): a path that has a fault already, and may lead nowhere
             steps = () if one.path in known else address.resolve(document, one.path)
             if steps and (steps[0] not in ("loop", "operator") or steps[1] in NOT_VARIED):
                 faults.append(RangeFault(one.path, OF_DEVICE))
@@ -411,11 +415,12 @@ class MeasuredFamily:
         sample; and its operator, None for nobody. Raises DeviceError, ValueError."""
         document = self.family.document(member)
         loop = document["loop"]
+        # one sample in the unit of the key that gives the delay
         unit = 1.0 if "delay_samples" in loop else float(loop["sampling_period_s"])
         key = "delay_samples" if "delay_samples" in loop else "delay_s"
         delay = float(loop.get(key, 0.0)) / unit  # samples
         whole = floor(delay + SAME)
-        if key in loop and delay >= 0.0:
+        if key in loop and delay >= 0.0:  # `check` refuses a negative one
             document = address.apply(document, [(dotted(("loop", key), document), whole * unit)])
         checked, _ = check(document, self.family.device.label)
         operator = None if checked.operator is None else build.operator(checked.operator)
@@ -438,10 +443,11 @@ class MeasuredFamily:
         controller, added, operator = self._computer_and_operator(one.member)
         period = controller.sampling_period
         changed = added > SAME or abs(period / self.period - 1.0) > SAME
-        if operator is None and not changed:
+        if operator is None and not changed:  # as it was measured, without the handle that nobody holds
             bare = replace(self.response, handle=None)
             if one.sweep is None or bare.sweeps is None:
                 return bare, controller
+            # the coherence is that of all sweeps together
             return replace(bare, value=bare.sweeps[one.sweep], sweeps=None, coherence=None), controller
         port, response = self._port(operator is not None), self.response
         if one.sweep is not None:
@@ -462,7 +468,7 @@ class MeasuredMembers:
         self.failed: dict[int, str] = {}
 
     def add(self, points: list[MeasuredMember]) -> None:
-        """Chart more members; those that have no chart are kept with the reason."""
+        """Chart more members; those that have no chart, or one whose edge is open, are kept with the reason."""
         for done, one in enumerate(points):
             self.progress("members", done, len(points))
             index = len(self.points)

@@ -181,18 +181,19 @@ def robust_study(
 ) -> RobustStudy:
     """The robust chart of a family of devices.
 
-    members    largest number of members charted; a list of operators without ranges is charted whole. Left out:
-               256, of a measured device 24
+    members    largest number of members charted, but one with each operator at least; a list of operators without
+               ranges is charted whole. Left out: 256, of a measured device 24
     unseen     number of random members tried afterwards (see `Violation`). Left out: 10000, of a measured device
                200
     seed       seed of the random numbers: equal seeds give equal answers
     tolerance  the search ends with a round that changes the area by a smaller share
+    progress   called with a stage of the work, the number of members or rounds done in it, and of all
     Raises     RangeError      for ranges that cannot be used
                DeviceError     for operators that cannot be read
                NoAnswerError     if no member can be built and charted
                NonlinearError  for a velocity estimate that is not linear
 
-    Of a measured device, see `robust_measured`.
+    Of a measured device, see `_measured_study`; there the tolerance has no part.
 
     >>> from zwidth.device.load import from_document
     >>> from zwidth.study.robust.family import Family, Range, build_together
@@ -238,7 +239,8 @@ def _add_violating(
     tolerance  the search ends with a round that changes the area by a smaller share
 
     Returns  the chart of all members, the number of rounds, the share of the area by which the last one moved the
-             edge, and whether the search ended because no member moves it by more than the tolerance
+             edge, and whether the search ended because no member moves it by more than the tolerance; without
+             ranges there is none to search, and it did
     """
     rounds, area_change, settled = 0, 0.0, not charted.family.free
     while not settled and len(charted.points) < members and chart.regions:
@@ -265,7 +267,7 @@ class _Members:
         self.failed: dict[int, str] = {}
 
     def add(self, points: list[FamilyMember], stage: str) -> None:
-        """Build and chart more members; those that fail are kept with the reason."""
+        """Build and chart more members; those that fail are kept with the reason. Progress is told as `stage`."""
         build_together(self.family, points)
         for done, point in enumerate(points):
             self.progress(stage, done, len(points))
@@ -290,7 +292,9 @@ class _Members:
 def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
     """Members to chart before the search: corners, centre and Sobol's points of the ranges, for every operator.
 
-    members  largest number of members charted, of which the share REFINING is left to the search
+    members  largest number of members charted, of which the share REFINING is left to the search; one for each
+             operator is yielded at least
+    seed     of Sobol's points
     """
     from scipy.stats import qmc
 
@@ -304,7 +308,7 @@ def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
         sobol = qmc.Sobol(len(free), scramble=True, seed=seed)
         # a power of two of them, and more than are wanted
         inside = sobol.random_base2(int(np.ceil(np.log2(count))) + 1)
-        if len(shares) == 1:  # too many corners: those nearest the first points
+        if len(shares) == 1:  # too many corners: of those nearest to the points the first in ascending order
             corners = np.unique(np.round(inside), axis=0)
             shares += list(corners[: count // 2])
         shares += list(inside[: count - len(shares)])
@@ -323,8 +327,10 @@ def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) ->
 def _measured_study(family: Family, members: int, unseen: int, seed: int, progress: Progress) -> RobustStudy:
     """The robust chart of a family of a measured device.
 
-    Of ranges, random members join one by one, the one first that runs deepest into the robust walls (see
-    `unseen_members`), until none of them does; then as many others are tried.
+    Of ranges, random members, `unseen` of them, join one by one, the one first that runs deepest into the robust
+    walls (see `unseen_members`), until none of them does or `members` are charted; then as many others are tried.
+
+    members  as for `robust_study`, each of them with one repetition of the measurement
     """
     from zwidth.study.robust.family import MeasuredFamily, MeasuredMember, MeasuredMembers
     from zwidth.study.robust.unseen_members import random_measured_members, violation_of_measured
@@ -367,8 +373,8 @@ def _add_deepest(
     members  largest number of members charted
 
     Returns  the chart of all members, the number of rounds, the share of the area by which the last one moved the
-             edge, whether the search ended because no member tried runs into the walls, and how often one was
-             tried that has no response
+             edge, whether the search ended because no member tried runs into the walls (without ranges it did),
+             and how often one was tried that has no response
     """
     from zwidth.study.robust.unseen_members import MEASURED_DEPTH, intrusions
 
@@ -376,6 +382,7 @@ def _add_deepest(
     rounds, area_change, settled = 0, 0.0, not measured.family.free
     unknown = 0
     while not settled and chart.regions:
+        # place in `tried` -> depth, of those that have a response
         deep = {place: one.depth for place, one in intrusions(measured, chart, tried, progress).items()}
         unknown += len(tried) - len(deep)
         tried = [one for place, one in enumerate(tried) if deep.get(place, 0.0) > MEASURED_DEPTH]

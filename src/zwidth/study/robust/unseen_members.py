@@ -54,9 +54,11 @@ class Violation(Documented):
     unseen                 number of members tried, without those that could not be built
     unknown                number of those that could not be built: nothing is known of them
     violating              number of them for which one of the walls is unstable
-    worst_spectral_radius  largest over all of them and all walls; at most 1 if none violates
+    worst_spectral_radius  largest over all of them and all walls; if none violates that of the members of the
+                           chart that bind; nan for a measured device
     worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
-                           be softened, at its damping, to be stable for a member; 0 if none violates
+                           be softened, at its damping, to be stable for a member; 0 if none violates, or only on
+                           walls elsewhere
     worst_member           that member's values: path -> value; {} if none violates
     """
 
@@ -73,7 +75,7 @@ def try_unseen_members(
 ) -> Violation:
     """Try `unseen` random members, drawn by `seed`, on walls of the robust chart of others."""
     walls, members = sample_walls(chart), list(_random_members(family, unseen, seed))
-    radius, softer = np.full(unseen, np.nan), np.zeros(unseen)
+    radius, softer = np.full(unseen, np.nan), np.zeros(unseen)  # nan: cannot be built
     for first in range(0, unseen, AT_ONCE):
         piece = members[first : first + AT_ONCE]
         for places, *found in _try_members(
@@ -113,7 +115,7 @@ def _try_members(
     not_built = np.ones(len(members), dtype=bool)
     for built in build_together(family, members):
         if built.table is not None:
-            known = built.table.section_count > 0
+            known = built.table.section_count > 0  # others have no loop in the table
             radius, softer = _worst_walls(built.table, walls, partial(spectral_radii, built.table))
             not_built[built.rows[known]] = False
             yield built.rows[known], radius[known], softer[known]
@@ -294,7 +296,8 @@ def intrusions(
 def violation_of_measured(
     family: MeasuredFamily, chart: MeasuredRobustChart, unseen: int, seed: int, progress: Progress
 ) -> Violation:
-    """What random members say of the robust walls. Spectral radii are not known of a response: nan."""
+    """Try `unseen` random members, drawn by `seed`, on the robust walls. Spectral radii are not known of a
+    response: nan."""
     members = list(random_measured_members(family, unseen, [seed, 1]))
     tried = intrusions(family, chart, members, progress)
     violating = [place for place, one in tried.items() if one.depth > MEASURED_DEPTH]
@@ -323,8 +326,8 @@ class MemberRadii:
         self._loops: dict[FamilyMember, Loop | None] = {}
 
     def prepare(self, wanted: Sequence[tuple[FamilyMember, Wall]]) -> None:
-        """Compute the radii of those pairs of member and wall whose members can be built together; the others are
-        computed when they are needed."""
+        """Compute the radii of those pairs of member and wall whose members can be built together; the others, and
+        those that come out as nan there, are computed when they are needed."""
         pairs = [pair for pair in dict.fromkeys(wanted) if pair not in self._radii]
         number = {member: n for n, member in enumerate(dict.fromkeys(member for member, _ in pairs))}
         member_of = np.array([number[member] for member, _ in pairs], dtype=np.int64)
@@ -382,7 +385,7 @@ def violating_members(
 
 def _searched_walls(chart: RobustChart) -> list[tuple[Wall, tuple[int, ...]]]:
     """Walls of the edge to search from, with the members that bind there: the stiffest, where the binding member
-    changes, and the middles and quarters of the four arcs with the most points."""
+    changes, and the middles and quarters of the four arcs with the most points; the first SEARCHED of these."""
     walls: list[tuple[Wall, tuple[int, ...]]] = []
     if chart.members_at_stiffness_max:
         walls.append(((chart.stiffness_max, chart.damping_at_stiffness_max), chart.members_at_stiffness_max))
@@ -436,7 +439,7 @@ def _climb(
         gained = False
         for k in free:
             for sign in (-1.0, 1.0):
-                neighbour = _neighbour(best, k, sign * step)
+                neighbour = _neighbour(best, k, sign * step)  # the same member at the end of its range
                 new_radius = radii.radius(neighbour, wall) if neighbour != best else -1.0
                 if new_radius > radius:
                     best, radius, gained = neighbour, new_radius, True

@@ -84,7 +84,7 @@ class ChangedDevices:
 
     def loop(self, name: str, argument: float) -> ChangedLoop:
         """What is read of the loop with the change `name` at an argument. Raises what building it alone raises."""
-        key, trial = (name, argument), self._trials[name].get(argument)
+        key, trial = (name, argument), self._trials[name].get(argument)  # None: built alone
         if trial is not None and trial not in self._tried:
             self._tried.add(trial)
             self._build(trial)
@@ -110,7 +110,7 @@ class ChangedDevices:
         return self.device.document
 
     def _build(self, trial: int) -> None:
-        """Build all changes together at all arguments of a trial, and read their loops.
+        """Build the changes that can be built together, at all arguments of a trial, and read their loops.
 
         trial  number of the first step in FIRST
         """
@@ -140,7 +140,11 @@ class ChangedDevices:
                 yield [name]
 
     def _columns(self, keys: list[Argument]) -> Iterator[DesignColumn]:
-        """Each number that is changed, by its value in each row: the device's own unless the row changes it."""
+        """Each number that is changed, by its value in each row: the device's own unless the row changes it.
+
+        keys  change's name and argument of each row
+        """
+        # of each number its values, the device's own first, and which of them (rows,) each row has
         values: dict[KeyPath, list[float]] = {}
         places: dict[KeyPath, np.ndarray] = {}
         for row, (name, argument) in enumerate(keys):

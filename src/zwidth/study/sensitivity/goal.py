@@ -156,7 +156,8 @@ def numbers_for_goal(
     nearest to the device's own value is found unless two lie between neighbours of a grid of 24 values to each
     side. The largest stiffness with the value is the goal to 1e-8.
 
-    Raises  ValueError   for a goal that is not a positive finite number
+    Raises  TypeError    for a goal that is no number
+            ValueError   for a goal that is not a positive finite number
             DeviceError  for a measured device, whose numbers are in its response
             what `sensitivities` raises for the device itself
     """
@@ -215,8 +216,9 @@ def _level(stiffness: float, goal: float) -> float:
 def _search_all(
     searches: list[_Search], charts: ChangedStiffness, goal: float, progress: Progress | None
 ) -> list[GoalNumber]:
-    """For each number the value with which the goal is reached: values are tried outwards, a few at a time, and
-    each bracket is narrowed before going on."""
+    """For each number the value with which the goal is reached, or why none is: values are tried outwards, a few
+    at a time, and each bracket is narrowed before going on. A number that has reached the goal is not tried
+    further out."""
     unfinished = searches
     for first in range(0, STEPS, AT_A_TIME):
         _chart_places([(one, t) for one in unfinished for t in one.grid(first)], charts, goal)
@@ -245,8 +247,11 @@ def _chart_places(places: list[tuple[_Search, float]], charts: ChangedStiffness,
 
 
 def _goal_number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
-    """The result of a search: the value that reaches the goal; else the value that comes nearest to the goal, and
-    why none reaches it."""
+    """The result of a search: the value that reaches the goal; else the value that comes nearest to the goal, nan
+    for a number without influence, and why none reaches it.
+
+    charts  whose `refusals` say why there is no device with values further out
+    """
     known = {t: level for t, level in one.samples.items() if isfinite(level)}
     best = one.reached
     status: Status = REACHED if best is not None else OUT_OF_RANGE
@@ -374,7 +379,7 @@ class ChangedStiffness:
             numbers = chart_numbers(built.table, STIFFEST)
             certain = numbers.status != DOUBTFUL
             rows = np.array(together, dtype=np.int64)[built.rows[certain]]
-            K[rows] = np.nan_to_num(numbers.stiffness[certain])
+            K[rows] = np.nan_to_num(numbers.stiffness[certain])  # nan: no wall is stable
             charted[rows] = True
         ended = set[tuple[str, bool]]()  # numbers, and to which side of the device's own value there is none left
         for n in np.flatnonzero(~charted).tolist():

@@ -144,6 +144,7 @@ def _read_piece(circle: CircleFactors, polynomials: Floats, pieces: EdgePieces, 
         sK, vB = s * pieces.wall[0], v * pieces.wall[1]
         # scaled by itself: a line is the same line at any multiple, and its scale jumps with the number of roots
         return float(pieces.start[k] - (a + sK + vB) / (abs(a) + abs(sK) + abs(vB)))
+    # the ends of the curve by t = tan(angle / 2): 0 for z = 1, infinite for z = -1
     return float(end_of_curve(polynomials, N, 0.0 if angle == 0.0 else np.inf)[0])
 
 
@@ -221,7 +222,10 @@ def _line_piece(tracer: Tracer, angle: float, peak: Peak) -> _Piece:
 
 
 def _crossing(peak: Peak, kind: Kind, pieces: list[_Piece], period: float) -> Optimum:
-    """The wall where two pieces of edge meet. Raises NoAnswerError where they touch without crossing."""
+    """The wall where two pieces of edge meet. Raises NoAnswerError where they touch without crossing.
+
+    period  sampling period [s]
+    """
     normals = np.array([one.normal for one in pieces])
     scaled = normals * np.array([1.0 / period, 1.0])  # K T and B have one unit
     if (

@@ -40,7 +40,8 @@ class Sensitivity:
     logarithmic  d ln K_max / d ln value; nan for the value 0, and where it could not be computed
     derivative   dK_max/dvalue [N/m per unit of the value]; nan where it could not be computed
     error        estimated error of `logarithmic`, for the value 0 of `derivative`
-    side         "both"; "above" or "below" where only the derivative towards larger or smaller numbers exists
+    side         "both"; "above" or "below" where only the derivative towards larger or smaller numbers exists; ""
+                 where none does
     reason       why a result is missing; "" where none is
     """
 

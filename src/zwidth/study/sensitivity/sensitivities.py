@@ -135,7 +135,11 @@ class _StiffnessDerivatives:
     obstacle: str
 
     def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
-        """The sensitivity to one number; of a number that cannot be varied, with the reason."""
+        """The sensitivity to the number at a path, which `steps` are in full; with the reason where it cannot be
+        varied, has no derivative, or is 0 and so has no logarithm.
+
+        value  the number in the device
+        """
         unit, reason = key_unit(steps), number_obstacle(steps, value)
         slope, side = Derivative(nan, nan), ""
         if not reason:
@@ -159,8 +163,9 @@ class _StiffnessDerivatives:
             yield Group(name, tuple(paths), total)
 
     def _slope(self, name: str) -> tuple[Derivative, str, str]:
-        """Derivative of ln K_max by a change, its side, and "" or the reason why there is none. It is taken from
-        both sides where these are alike, else from above, else from below.
+        """Derivative of ln K_max by the change `name`, its side, and "" or the reason why there is none; then it
+        is nan, without a side. It is taken from both sides where these are alike, else from above, else from
+        below.
 
         A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
         """
@@ -244,7 +249,7 @@ def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
     """Path -> paths of its members: each list and matrix, and each key over all elements of a list of tables."""
     members: dict[str, list[str]] = {}
     for path, steps, _ in property_numbers(document):
-        whole = steps
+        whole = steps  # of a number in a list or matrix the path of that; else of the number itself
         while whole and isinstance(whole[-1], int):
             whole = whole[:-1]
         names = [dotted(whole, document)] if whole != steps else []
@@ -270,8 +275,10 @@ DELAYS: Final = (("loop", "delay_samples"), ("loop", "delay_s"))
 def measured_sensitivities(
     device: Device, point: OperatingPoint, progress: Progress | None = None
 ) -> Sensitivities:
-    """Sensitivity of the largest stiffness of a measured device to the numbers that can be varied.
+    """Sensitivity of the largest stiffness of a measured device to the numbers that can be varied; without numbers
+    where no wall is stable. It is that of the chart without its uncertainty.
 
+    progress  as for `sensitivities`
     Raises  ResponseError  as the chart does; for an operator also where the handle was not measured
     """
     response, operator = point.measured, point.operator
@@ -327,6 +334,7 @@ def _measured_sensitivity(
     largest  the largest stiffness now [N/m]
     """
     path, unit = dotted(steps, device.document), key_unit(steps)
+    # a delay can be varied whatever it is, and where the file gives none
     if steps not in DELAYS and (reason := number_obstacle(steps, value)):
         return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
     T = port.period

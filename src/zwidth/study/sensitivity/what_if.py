@@ -122,7 +122,8 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
 
 
 def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
-    """Each single change of the device or its computer, see `Change`."""
+    """Yield each single change of the device or its computer, see `Change`; those that do not apply with the
+    obstacle."""
     controller, plant = point.computer, point.plant
     ungripped = point.ungripped_plant  # the device's own damping, without the operator's
 
@@ -213,6 +214,7 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
     yield "model-motor-mass", f"motor mass{damped}", "", loop_in("motor-mass")
     lossless_loop = loop_in("motor-mass", lossless=True)
     yield "model-motor-mass-undamped", "motor mass without damping", undamped_only, lossless_loop
+    # with damping the device as described is not this model, even where it is rigid
     rigid = "" if damped else obstacle_if_same("rigid")
     yield "model-rigid-undamped", "rigid without damping", rigid, loop_in("rigid", lossless=True)
 

@@ -137,9 +137,9 @@ def refined_dampings(coverage: Coverage, counts: Sequence[int], pieces: int) -> 
     counts  numbers of devices whose bands are wanted
     pieces  into which each step is divided
     """
-    B, steps = coverage.dampings, set[int]()
+    B, steps = coverage.dampings, set[int]()  # step n lies between lines n and n + 1
     for count in counts:
-        _, at = coverage.largest(count)
+        _, at = coverage.largest(count)  # `at`, `bottom`, `top`: indices of lines; -1: none
         bottom, top = coverage.lowest(count), coverage.topmost(count)
         steps |= {at - 1, at} if at >= 0 else set()
         steps |= {bottom - 1, top} if top >= 0 else set()
@@ -189,7 +189,7 @@ def stable_intervals(outlines: Sequence[Floats], dampings: Floats) -> Floats:
     for d in np.flatnonzero(np.diff(starts) > MOST_INTERVALS):
         on_line = np.arange(starts[d], starts[d + 1])
         shorter = np.argsort(ends[on_line, 0] - ends[on_line, 1], kind="stable")[MOST_INTERVALS:]
-        line[on_line[shorter]] = -1
+        line[on_line[shorter]] = -1  # left out
     ends, line = ends[line >= 0], line[line >= 0]
     out[line, np.arange(len(line)) - np.searchsorted(line, line)] = ends
     return out
@@ -246,8 +246,8 @@ class EdgeJob:
         return fingerprint("edges", self.sweep.question, self.dampings)
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Compute devices first to last - 1. Ends that there are not are 0, 0; a device without an edge has a
-        status."""
+        """Compute devices first to last - 1: the ends of the intervals [N/m] of each line, 0, 0 where there are
+        fewer. Without a chart all are nan, with its status; notes are listed once, with the first column."""
         values = np.zeros((last - first, len(self.measures)))
         status = np.full(values.shape, OK, dtype=np.uint8)
         notes: list[Note] = []
@@ -262,7 +262,7 @@ class EdgeJob:
 
     def outlines(self, first: int, last: int) -> Iterator[tuple[int, Outlines]]:
         """Yield number and outlines of each of the devices first to last - 1: those built together before the
-        others."""
+        others; where all are known already, in their order."""
         numbers = range(first, last)
         if all(number in self.known for number in numbers):
             yield from ((number, self.known[number]) for number in numbers)
@@ -274,6 +274,7 @@ class EdgeJob:
                 yield first + row, self._remembered(first + row, _outlines_at_point(points[place]))
         for row in np.flatnonzero(~built).tolist():
             point = self.sweep.point_alone(first + row)
+            # else `point` is status and reason
             found = _outlines_at_point(point) if isinstance(point, OperatingPoint) else Outlines(None, *point)
             yield first + row, self._remembered(first + row, found)
 

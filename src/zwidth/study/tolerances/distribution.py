@@ -75,7 +75,8 @@ class Distribution:
         return float(drawn.mean()), float(drawn.std())
 
     def values(self, shares: ArrayLike) -> Floats:
-        """Values (...) at which the distribution function has these shares (...), 0 to 1.
+        """Values (...) at which the distribution function has these shares (...), 0 to 1, of which those below
+        LEAST_SHARE and above 1 - LEAST_SHARE count as these.
 
         Of a triangular one with ends a, b and peak c the distribution function is (x - a)^2 / ((b - a)(c - a))
         below c and 1 - (b - x)^2 / ((b - a)(b - c)) above.

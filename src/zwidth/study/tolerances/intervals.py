@@ -105,6 +105,8 @@ def count_bounds(share: float, count: int) -> tuple[int | None, int, int]:
     """
     from scipy.special import betaincinv
 
+    # bounds of the probability of a wall that k devices share (Clopper and Pearson): below low or above high it
+    # is with 2.5 % at most
     k = np.arange(1, count + 1)
     low = betaincinv(k, count - k + 1.0, OUTSIDE)
     high = np.append(betaincinv(k[:-1] + 1.0, count - k[:-1] * 1.0, 1.0 - OUTSIDE), 1.0)

@@ -62,7 +62,8 @@ class MeasureQuantiles(Documented):
 
 
 def outcome_counts(columns: Sequence[Column], cells: CellValues) -> dict[str, int]:
-    """Outcome -> number of devices, those that do not occur left out.
+    """Outcome -> number of devices, from the cells (devices, columns) of the columns; those that do not occur are
+    left out.
 
     The wanted wall is stable or unstable; where none is wanted, a device has a stable wall or none. The others are
     devices whose verdict is undecided, that cannot be built, that do not get to the handle's position, ...
@@ -105,7 +106,8 @@ def counted_values(column: Column, values: Floats, status: NDArray[np.uint8]) ->
 def measure_quantiles(
     columns: Sequence[Column], cells: CellValues, shares: Sequence[float]
 ) -> list[MeasureQuantiles]:
-    """Quantiles of each measure; the wanted wall's verdict, which has none, is left out."""
+    """Quantiles at `shares` (0 to 1) of each measure over the devices of the cells (devices, columns); the wanted
+    wall's verdict, which has none, is left out."""
     found = []
     for n, column in enumerate(columns):
         if column.name == WALL_IS_STABLE.name:
@@ -133,7 +135,11 @@ def all_indices(columns: Sequence[Column], cells: CellValues, keys: Sequence[str
 
 
 def _outcomes(columns: Sequence[Column], cells: CellValues) -> Iterator[tuple[str, str, Floats, str]]:
-    """Yield name, meaning and value (devices,) of each outcome, and why it has no indices; "" where it has."""
+    """Yield name, meaning and value (devices,) of each outcome, and why it has no indices; "" where it has. The
+    wanted wall's verdict comes first.
+
+    cells  (devices, columns)  of those that `indices_of` wants
+    """
     names = [one.name for one in columns]
     order = sorted(range(len(columns)), key=lambda n: names[n] != WALL_IS_STABLE.name)
     for n in order:
@@ -222,6 +228,7 @@ def indices_of(name: str, of: str, outcome: Floats, keys: Sequence[str], seed: i
 
     outcome  (samples * (tolerances + 2),) of the devices of `sampled_shares`; none is nan
     keys     of the tolerances
+    seed     of the resamples that the intervals are from
     """
     if np.ptp(outcome) == 0.0:
         return Indices(name, of, (), f"it is {outcome[0]:.6g} for all {len(outcome)} devices")

@@ -115,7 +115,8 @@ def read_question(
 def question_of(
     document: dict[str, Any], label: str = "study", samples: int | None = None, seed: int | None = None
 ) -> ToleranceQuestion:
-    """What a document asks of produced devices; see `read_question`."""
+    """What a document asks of produced devices; see `read_question`. `samples` and `seed` take the place of those
+    of its [draw]."""
     found: list[Tolerance] = []
     given = table(document, "draw")
     draw = given | {key: value for key, value in (("samples", samples), ("seed", seed)) if value is not None}
@@ -267,6 +268,7 @@ def question_over(
     """
     check_kind("device", device, Device)
     names, by_name = measures_in_file(measures, user_measures)
+    # joint angles by name are no position that the study's check reads: the device looks at them below
     angles = circumstances.get("at") if isinstance(circumstances.get("at"), Mapping) else None
     given = {
         key: plain_value(value)

@@ -103,6 +103,7 @@ def tolerance(
     progress       is called with the stage, the number of devices done, and of all of them
     workers        largest number of processes; left out: one for each core
     cluster        address of a dask scheduler, or "local"
+    user_measures  a user's measures by the name that `measures` has them by
     time_limit     time after which a design or cell is given up [s]: it is out of time
     Raises         DeviceError   with all faults of the arguments
                    MeasureError  for measures that do not exist for this device
@@ -140,7 +141,8 @@ def run_tolerances(
 
 
 def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
-    """Answer a question with a function that computes jobs. Raises what `sweep_job` and that function raise."""
+    """Answer a question with a function that computes jobs. Where no drawn device has an answer nothing
+    is computed beyond measures and indices. Raises what `sweep_job` and that function raise."""
     values = drawn_values(question.tolerances, question.seed, question.samples)
     job, cells, indices = _measure_drawn(question, values, compute)
     found = ToleranceStudy(question=question, job=job, cells=cells, indices=tuple(indices))
@@ -212,7 +214,7 @@ def _bands(
     question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], compute: Compute
 ) -> tuple[tuple[Band, ...], int]:
     """Bands of the chart, one for each quantile, the likeliest walls first; and how many drawn devices have no
-    chart."""
+    chart. `values` as for `_measure_drawn`."""
     shares = question.quantiles[::-1]
     counts = [count_bounds(share, question.samples) for share in shares]
     wanted = [count for each in counts for count in each if count]
@@ -241,6 +243,8 @@ def _coverage(
 ) -> tuple[Coverage, int]:
     """How many drawn devices are stable along lines of damping: even ones, then finer ones (`refined_dampings`).
 
+    values   (samples,) of each tolerance, of the drawn devices
+    counts   numbers of devices whose bands are wanted
     Returns  the count of stable devices, and how many have no chart and count as not stable
     """
     job = sweep_job(
@@ -375,6 +379,7 @@ def member_changes(
     """The same random members for all designs that are compared: common random numbers.
 
     members  number of produced devices of each design
+    seed, purpose  as for `drawn_values`
     Returns  factors and offsets (members, tolerances) that any design's own numbers are changed by
     """
     count = len(tolerances)

@@ -107,7 +107,8 @@ def _ways_in_words(ways: Sequence[Sequence[str]]) -> str:
 def _tolerance(
     table: dict[str, Any], device: Device | None, taken: SetNumbers, faults: TableFaults
 ) -> Tolerance | None:
-    """The tolerance of a table; None where it has faults, which are added, or some that the schema reports.
+    """The tolerance of a table; None where its key or its distribution has faults, which are added, or some that
+    the schema reports. Faults of its ties are added, too, but the tolerance is returned.
 
     taken   the numbers that tolerances before this one set; those of this one are added
     faults  those of its width already; the others are added
@@ -148,6 +149,7 @@ def _cut_at_obstacles(law: Distribution, path: str, faults_at: FaultsOf) -> Dist
     path       of the number in full
     faults_at  value of the number -> faults of the device with it
     """
+    # with a middle that no device can have there is no way to the ends: `beyond_faults` reports it
     if law.kind not in WITH_TAILS or faults_at(law.middle):
         return law
     ends = [law.low, law.high]
@@ -177,7 +179,8 @@ def _key_fault(document: dict[str, Any], key: str) -> str:
 def _distribution(
     table: dict[str, Any], key: str, value: float | None, document: dict[str, Any], faults: TableFaults
 ) -> tuple[Distribution, bool] | None:
-    """The distribution of a table without faults of its width, and whether it is relative; faults are added.
+    """The distribution of a table without faults of its width, and whether it is relative; None with a fault,
+    which is added, or which the schema reports.
 
     value  the number in the device file; None: it has none
     """
@@ -202,7 +205,7 @@ def _distribution(
         faults.append(((width_key,), f"needs a value of '{key}' other than 0 in the device file; give {instead}"))
         return None
     limits = _limits(address.resolve(document, key))
-    middle = value if value is not None else 0.0
+    middle = value if value is not None else 0.0  # 0: not looked at, as low and high give the middle
     if kind in WITH_TAILS:
         made = _with_tails(table, kind, key, middle, limits, faults)
     else:
@@ -218,8 +221,12 @@ def _width_key(table: dict[str, Any]) -> str:
 def _with_tails(
     table: dict[str, Any], kind: str, key: str, value: float, limits: NumberLimits, faults: TableFaults
 ) -> Distribution | None:
-    """A normal or lognormal distribution by the width in its table, cut off where the number is not valid; None
-    with a fault, which is added."""
+    """A normal or lognormal distribution by the width in its table, cut off at `limits`; None with a fault, which
+    is added.
+
+    key    of the number, for messages
+    value  middle of the distribution where its table has no low and high
+    """
     cut = float(table.get("cut_at_deviations", CUT))
     low, high = table.get("low"), table.get("high")
     if kind == "lognormal":
@@ -249,7 +256,11 @@ def _with_tails(
 
 
 def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: TableFaults) -> Distribution | None:
-    """A uniform or triangular distribution by the width in its table; None with a fault, which is added."""
+    """A uniform or triangular distribution by the width in its table; None with a fault, which is added.
+
+    key    of the number, for messages
+    value  middle of the distribution; of a uniform one with low and high it is not looked at
+    """
     low, high = table.get("low"), table.get("high")
     percent = table.get("plus_minus_percent")
     middle = value
@@ -360,6 +371,7 @@ def _fault_in_words(fault: Fault, path: str) -> str:
 def _narrower_advice(law: Distribution, width_key: str, ends: Sequence[float], faults_at: FaultsOf) -> str:
     """Advice: the width of a distribution that stays between `ends`, the farthest values that a device can have.
 
+    width_key  the first of the keys of its table that give the width
     faults_at  value of the number -> faults of the device with it
     """
     middle = law.middle
@@ -425,7 +437,8 @@ class Obstacle:
 
 
 def faults_with(document: Mapping[str, Any], key: str, ties: tuple[Tie, ...]) -> FaultsOf:
-    """The faults that a device has with a value of one number, and of those tied to it, all others as they are."""
+    """Function: value of one number -> the faults that a device has with it, and with what is tied to it, all
+    other numbers as they are."""
     axis = Axis(key, (), ties=ties)
 
     def faults(value: float) -> Sequence[Fault]:
@@ -441,7 +454,10 @@ def faults_with(document: Mapping[str, Any], key: str, ties: tuple[Tie, ...]) ->
 
 
 def obstacle(faults: FaultsOf, start: float, end: float) -> Obstacle | None:
-    """What is in the way from a value that a device can have to an end of a distribution; None where nothing is.
+    """What is in the way from a value that a device can have to an end of a distribution; None where a device can
+    have the end.
+
+    faults  value -> faults of the device with it
 
     Halves the way between a value that a device can have and one that it cannot. Where 0 lies between the two it
     is tried first: halving comes near to 0 without end.
@@ -452,7 +468,7 @@ def obstacle(faults: FaultsOf, start: float, end: float) -> Obstacle | None:
     good, bad = start, end
     wanted = 0.0 if min(start, end) < 0.0 < max(start, end) else 0.5 * (good + bad)
     for _ in range(HALVINGS):
-        if wanted in (good, bad):
+        if wanted in (good, bad):  # neighbouring numbers
             break
         good, bad = (good, wanted) if faults(wanted) else (wanted, bad)
         wanted = 0.5 * (good + bad)

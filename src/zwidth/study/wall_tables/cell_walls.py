@@ -191,8 +191,8 @@ class _TableSearch:
         return self.sampler.lattice(postures_per_axis, directions_per_axis)
 
     def _edges(self, samples: CellSamples) -> LoopEdgeChords:
-        """The edges at n samples with each hand, hand after hand. Raises _Failed where a posture cannot be had, or
-        an edge is undecided."""
+        """The edges at n samples with each hand, hand after hand; of a cell that is everywhere one edge with each.
+        Raises _Failed where a posture cannot be had, or an edge is undecided."""
         question, grid = self.question, self.question.grid
         if grid.dimensions == 0:
             edges = LoopEdgeChords.joined(

@@ -80,8 +80,8 @@ class LoopEdgeChords:
 def edges_of_points(point: OperatingPoint) -> LoopEdgeChords:
     """The edges of the stable sets at all N points of `point`, in C order whatever its shape.
 
-    A point whose modes compiled code cannot treat, or whose chart is in doubt there, is charted by itself in
-    Python; it is not `known` where that fails, too.
+    A point whose modes compiled code cannot treat, whose chart is in doubt there, or of a measured response, is
+    charted by itself in Python; it is not `known` where that fails, too.
 
     Raises  what `OperatingPoint.loop` and `chart_at` raise
     """
@@ -259,8 +259,8 @@ def stable_damping_intervals(edges: LoopEdgeChords, bands: Floats) -> Floats:
 
 @compiled
 def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, out: Floats) -> None:
-    """Fill in `out` (N, b, GAPS, 2), what `stable_damping_intervals` returns, from `chords` and `offsets` of N
-    edges.
+    """Fill in `out` (N, b, GAPS, 2), nan before, what `stable_damping_intervals` returns, from `chords` and
+    `offsets` of N edges.
 
     bands  (b, 2)  lowest and highest stiffness of each [N/m]
     room   (k, 2)  memory for the intervals of damping that the chords of one loop occupy
@@ -272,7 +272,7 @@ def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, 
             n = _occupied_intervals(chords, first, last, low, high, room)
             # no edge lies between the highest end so far and the next lower end: one wall there tells of that gap
             top, count = -np.inf, 0
-            for k in range(n):
+            for k in range(n):  # below the first and above the last lies no gap: no such wall is stable
                 if (
                     room[k, 0] > top
                     and k > 0
@@ -341,7 +341,7 @@ def _keep_longest(out: Floats, count: int, low: float, high: float) -> int:
         if out[k, 1] - out[k, 0] < out[shortest, 1] - out[shortest, 0]:
             shortest = k
     if high - low > out[shortest, 1] - out[shortest, 0]:
-        for k in range(shortest, GAPS - 1):
+        for k in range(shortest, GAPS - 1):  # those behind it move up, and stay in order
             out[k, 0], out[k, 1] = out[k + 1, 0], out[k + 1, 1]
         out[GAPS - 1, 0], out[GAPS - 1, 1] = low, high
     return count
@@ -363,7 +363,9 @@ def common_interval(intervals: Floats) -> tuple[float, float]:
 def _common(intervals: Floats, room: Floats) -> tuple[float, float]:
     """Lowest and highest damping of the longest common interval, see `common_interval`; nan where there is none.
 
-    Intervals common to the loops so far, at first all dampings, are cut by those of one loop after the other.
+    Intervals common to the loops so far, at first all dampings, are cut by those of one loop after the other. The
+    room must hold all of them, as that of `common_interval` does: others are left out.
+
     room  (2, k, 2)  memory: the common intervals before and after a loop, which change places from loop to loop
     """
     count, now = 1, 0

@@ -95,6 +95,7 @@ def cells_of(
 
     ranges   lowest and highest coordinate along each axis [m]; None: the file's workspace, or what is reached
     cells    number along each axis; left out: 20 along the longer side of a plane, 6 along the longest in space
+    assembly  as for `Device.at`; None: the device's reference
     Raises   WorkspaceError  for a device whose handle moves on a curve, on a curved surface or about axes, for
                              ranges and numbers of cells that are none; and what `plane_of` raises
     """
@@ -112,6 +113,7 @@ def cells_of(
     _check_counts(cells, 2 if flat else 3)
     if flat:
         _check_no_range_of_z(ranges)
+        # only the first and the last line are read, the ends of the grid
         lines = None if cells is None else (cells[0] + 1, cells[1] + 1)
         plane = plane_of(device, None, None, ranges[0], ranges[1], lines or (2, 2), assembly)
         low, high = np.array([plane.x[0], plane.y[0]]), np.array([plane.x[-1], plane.y[-1]])
@@ -234,8 +236,8 @@ class Sectors:
         return out
 
     def places(self, directions: Floats) -> tuple[Ints, Floats]:
-        """Sectors (n,) of vectors (n, d), none of them zero, and their shares (n, d - 1) of the sectors' size: the
-        inverse of `directions`.
+        """Sectors (n,) of vectors (n, d), none of them zero, and their shares (n, d - 1) of the sectors' size with
+        its overlap: the inverse of `directions`, within the sectors themselves.
 
         >>> sectors = Sectors(2, 1)
         >>> sectors.places(sectors.directions(1, np.array([[0.25]])))

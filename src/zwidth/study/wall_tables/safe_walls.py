@@ -108,7 +108,10 @@ def safe_walls_job(
     model: str | None,
     seed: int,
 ) -> SafeWallsJob:
-    """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made."""
+    """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made.
+
+    ranges  x, y and z of `safe_walls`
+    """
     check_kind("device", device, Device)
     _check_kinds(hands, cells, ranges)
     check_arguments(EXPORT, levels=levels, directions=directions, margin=margin, size_limit=size_limit, seed=seed)

@@ -187,9 +187,11 @@ class SafeWalls(Result):
         """
         counts = np.where(self.level > 0, self.question.slots * self.levels, 1)  # rows of each cell
         cell = np.repeat(np.arange(self.grid.count), counts)
+        # of each row its number within the cell
         within = np.arange(len(cell)) - np.repeat(np.cumsum(counts) - counts, counts)
         slot, band = np.divmod(within, self.levels)
         columns: dict[str, Any] = {}
+        # (cells, d) numbers along the axes; d may be 0
         places = np.array([self.grid.index(int(one)) for one in range(self.grid.count)]).reshape(
             self.grid.count, -1
         )
@@ -210,7 +212,7 @@ class SafeWalls(Result):
         return columns
 
     def dataset(self) -> xr.Dataset:
-        """The rectangles, and the bands of all tables, over the cells' middles."""
+        """The rectangles, and the bands of all tables, over the cells' middles; `status` as numbers, not names."""
         import xarray as xr
 
         grid, shape = self.grid, self.grid.counts[::-1]
@@ -340,6 +342,7 @@ def _common_rectangle(top: Floats, ranges: Floats, level: Ints, span: float | No
     top     (cells,)  largest stiffness of each [N/m]
     ranges  (cells, levels, 2)  of damping in each band [N s/m]
     level   (cells,)  how many bands each cell's rectangle has
+    span    as in `SafeWalls`
     """
     if not len(top):
         return Rectangle(0.0, 0.0, 0.0)
