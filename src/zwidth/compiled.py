@@ -119,7 +119,8 @@ def _kernel(function: Function, options: dict[str, Any]) -> Function:
     options  of numba's compilation, beyond `OPTIONS`; with APART: never inlined
     """
     if config.DISABLE_JIT:
-        # 1/0 is inf in kernels, as of NumPy's numbers; Python's raise, and so would parts of its complex numbers
+        # 1/0 is inf in kernels, as of NumPy's numbers; Python's raise, and so would the parts of a Python complex:
+        # the function, run as Python, finds NumPy's under this name
         function.__globals__.setdefault("complex", np.complex128)
         return function
     options = {**OPTIONS, **options}

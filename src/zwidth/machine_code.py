@@ -55,7 +55,10 @@ class MachineCode(_Cache):
         return str(written_folder() or "")
 
     def load_overload(self, signature: Any, target: Any) -> CompileResult | None:
-        """The kernel for one signature, ready to be called; None where it must be compiled."""
+        """The kernel for one signature, ready to be called; None where it must be compiled.
+
+        target  numba's context
+        """
         target.refresh()
         triple, name, features = target.codegen().magic_tuple()
         # each folder, and the processor that its kernels are compiled for
@@ -209,6 +212,7 @@ def _restored(target: Any, parts: tuple[Any, ...]) -> CompileResult:
     library.enable_object_caching()
     library._set_compiled_object(machine_code)
     library._finalize_final_module()
+    # as after compiling: numba then takes these names for defined
     codegen._engine._defined_symbols.update(names)
     return CompileResult(
         target_context=target,

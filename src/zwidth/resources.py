@@ -144,7 +144,7 @@ def check_memory(numbers: float, what: str, advice: str) -> None:
     except (AttributeError, ValueError, OSError):
         memory = UNKNOWN
     wanted = 8.0 * numbers
-    if not wanted <= SHARE * memory:
+    if not wanted <= SHARE * memory:  # nan is too large, too
         raise TooLarge(
             f"{what} would take {wanted / 1e9:.3g} GB of memory, "
             f"and this machine has {memory / 1e9:.3g} GB; {advice}"

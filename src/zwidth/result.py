@@ -81,7 +81,10 @@ def documented(unit: str = "", **how: Any) -> Callable[[Function], Function]:
 
 @cache
 def entries_of(kind: type) -> dict[str, tuple[str, Entry]]:
-    """Key and entry of each attribute of a dataclass that its document has, in order; those of its bases first."""
+    """Key and entry of each attribute of a dataclass that its document has, in order.
+
+    Those of its bases first, of each class fields before properties; but one with `before` stands where that says.
+    """
     of_fields: dict[str, Mapping[Any, Any]] = {one.name: one.metadata for one in fields(kind)}
     found: dict[str, Entry] = {}
     for base in reversed(kind.__mro__):
@@ -112,7 +115,10 @@ class Documented:
     """A dataclass whose numbers can be read by their keys."""
 
     def document(self) -> dict[str, Any]:
-        """Every number by its key, the unit in the name; parts by their own documents, tuples as lists."""
+        """Every number by its key, the unit in the name; parts by their own documents, tuples as lists.
+
+        Empty ones are kept, null or left out, as their entries declare.
+        """
         entries: dict[str, Any] = {}
         kind: Any = type(self)  # a class is hashable, which mypy denies of a variable one
         for attribute, (key, declared) in entries_of(kind).items():

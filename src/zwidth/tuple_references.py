@@ -118,7 +118,10 @@ class _FieldType(AttributeTemplate):
 
 @lower_getattr_generic(TupleReference)
 def _read(context: Any, builder: Any, reference: TupleReference, address: Any, name: str) -> Any:
-    """Code that reads a field by its name: what stands there, or the address of a tuple within the tuple."""
+    """Code that reads a field by its name: what stands there, or the address of a tuple within the tuple.
+
+    context, builder  of numba and LLVM;   address  of the tuple
+    """
     index = reference.fields.fields.index(name)
     kind = reference.fields[index]
     # by the distance in bytes: the type of the whole tuple, written out, has thousands of characters

@@ -72,6 +72,7 @@ def wall_law_parts(controller: Controller, *, spell_out: bool = False) -> list[s
         estimate = "velocity by the backward difference"
     if not isinstance(controller.velocity, BackwardDifference):
         name = next(name for name, method in METHODS.items() if isinstance(controller.velocity, method))
+        # one that is on by its name, one that is off not at all, a word by itself, a number with its name
         parameters = ", ".join(
             key
             if value is True

@@ -75,7 +75,7 @@ def new_folder(path: Path) -> Iterator[Path]:
 
 
 def _netcdf(draft: Path, dataset: xr.Dataset) -> None:
-    """Write the dataset as NetCDF 3, with uint8 as int16, in the variables and in their attributes."""
+    """Write the dataset as NetCDF 3, which has no uint8: as int16 in variables and in their attributes."""
     signed = dataset.copy()
     for name, variable in dataset.variables.items():
         if variable.dtype == np.uint8:
@@ -180,6 +180,7 @@ def _write_columns(group: Any, sweep: Sweep) -> None:
     for n, one in enumerate(sweep.job.columns):
         attributes = column_attributes(sweep, n)
         values = _array(group, one.name, shape, chunks, np.dtype(np.float64), np.nan, dims, attributes)
+        # arrays among the attributes become lists, for JSON
         flags = {key: getattr(value, "tolist", lambda v=value: v)() for key, value in status_flags().items()}
         status = _array(group, f"{one.name}_status", shape, chunks, np.dtype(np.uint8), None, dims, flags)
         arrays.append((values, status))

@@ -109,7 +109,10 @@ def _that_has_one(have: Flags) -> str:
 
 
 def _sideways_text(path: LoadPath) -> str:
-    """Sentence on motions along the surface, which no wall holds: under which pushes one grows, and how fast."""
+    """Sentence on motions along the surface, which no wall holds: under which pushes one grows, and how fast.
+
+    "" where none is known because no push has a stable wall
+    """
     rates, pushes = path.growth_rates, path.pushes
     known = np.isfinite(rates)
     if not known.any():

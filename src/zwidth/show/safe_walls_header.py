@@ -210,6 +210,7 @@ def _array(kind: str, name: str, values: Iterable[str]) -> str:
         line += f"{value}, "
     lines.append(line)
     body = "\n  ".join(row.rstrip() for row in lines)
+    # without the last comma
     return f"static const {kind} {name}[{len(listed)}] ZWIDTH_TABLE = {{\n  {body[:-1]}\n}};\n"
 
 

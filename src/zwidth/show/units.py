@@ -305,7 +305,7 @@ _moments: ContextVar[bool] = ContextVar("moments", default=False)
 def keys_of_moments(value: Any, table: str = "") -> Any:
     """A document, or columns, with the keys of moments about an axis.
 
-    table  the key under which it stands
+    table  the key under which it stands: one of OF_FILES stays as it is, of one of OF_SPACE some keys stay
 
     >>> keys_of_moments({"stiffness_max_N_per_m": 2.0, "x_m": [0.1], "inner": [{"rigid_mass_kg": 1.0}]})
     {'stiffness_max_Nm_per_rad': 2.0, 'x_m': [0.1], 'inner': [{'rigid_mass_kg_m2': 1.0}]}

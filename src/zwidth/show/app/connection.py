@@ -115,6 +115,7 @@ class Lane:
                     self._room.release()
                 continue
             answered = await self._compute(request)
+            # of a view that was sent the page makes room, by `confirm`
             if kind == "view" and self._room is not None and not answered:
                 self._room.release()
 

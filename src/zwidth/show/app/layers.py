@@ -36,8 +36,11 @@ DISKS: Final = 25  # of the angles, at which a disk is drawn
 
 
 def impedance(point: OperatingPoint, wall: Wall) -> Contents:
-    """Moduli over frequency [Hz] of the impedances of a wall [N s/m]: felt by the hand, commanded, of free
-    motion."""
+    """Moduli over `frequency` [Hz] of the impedances of a wall [N s/m]: felt by the hand, commanded, of free
+    motion; in the head static stiffness [N/m] and mass [kg] that are felt.
+
+    `felt` is left out where it is not known.
+    """
     felt = point.felt(wall.stiffness, wall.damping)
     arrays = {
         "frequency": felt.frequency,
@@ -161,7 +164,7 @@ def page_view(opened: OpenedDevices, state: State, layers: Sequence[str], neares
                 still, rates = scene_rates(point)
                 layer_head, layer_arrays = layer_head | still, layer_arrays | rates
         except (ArithmeticError, ValueError, NotImplementedError, ChartError) as error:
-            missing = isinstance(error, MissingNumbersError)
+            missing = isinstance(error, MissingNumbersError)  # whose text has no subject
             if name == "chart" and not missing:
                 raise
             head[name] = {"reason": f"{'It ' if missing else ''}{_failure_sentence(error)}"}
@@ -269,7 +272,7 @@ def _with_model(device: Device, state: State, model: str) -> Callable[[], Chart]
 
 
 def _hands(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-    """The charts in the bundled hands, and in nobody's."""
+    """The charts in the bundled hands and in nobody's, but for the one that holds the device now."""
     now = device.operator_name
 
     def held(name: str) -> Callable[[], Chart]:
@@ -402,7 +405,8 @@ def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 def scene_rates(point: OperatingPoint) -> Contents:
     """How the scene's points move per unit of each coordinate of the plant.
 
-    Returns  arrays of rates, (..., 3, coordinates); or none, with the reason in the head as `still`
+    Returns  arrays of rates, (..., 3, coordinates); or none, with the reason in the head as `still`, but where no
+             scene is drawn
     """
     if point.mechanism is None:
         chain = _mass_chain(point)

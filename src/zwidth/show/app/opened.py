@@ -76,6 +76,7 @@ class OpenedDevices:
         """The state's operator: of its own numbers or bundled; "none": nobody, None: that of the device file."""
         if state.hand is not None:
             hand = state.hand
+            # a rigid grasp, which has no stiffness, has no damping
             grasp = None if hand.grasp_stiffness is None else hand.grasp_damping
             return Operator(hand.arm_mass, hand.arm_stiffness, hand.arm_damping, hand.grasp_stiffness, grasp)
         name = state.operator

@@ -30,7 +30,8 @@ def serve(
 ) -> None:
     """Serve the page until ctrl-C. Raises BadInput where no port can be had.
 
-    start  what a page opens first, as `start_of` returns it;   say  prints lines
+    start    what a page opens first, as `start_of` returns it
+    token    as of `Settings`;   browser  whether to open the page in one;   say  prints lines
     """
     listening = listen(host, port)
     settings = Settings(host, listening.getsockname()[1], token, start)

@@ -54,7 +54,7 @@ class Settings:
 
     host, port  it listens on
     token       that a page must bring; "" on this computer alone
-    start       what a page opens first: `device`, and files and settings for it
+    start       what a page opens first: `state` and `files`, as `start_of` returns them
     framed      whether notebooks on this computer may show the page in a frame
     """
 
@@ -219,7 +219,7 @@ def _add_socket(
     async def socket(websocket: WebSocket, token: str | None = None) -> None:
         """Serve one page, from its first message until it is gone."""
         if not _from_own_page(websocket, settings, token) or len(open_pages) >= MOST_PAGES:
-            await websocket.close(code=1008)
+            await websocket.close(code=1008)  # refused by the server's rules
             return
         await websocket.accept()
         opened = Connection(pool, websocket.send_bytes, received)

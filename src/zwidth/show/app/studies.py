@@ -103,8 +103,9 @@ def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) 
 
     That is of the layers `scene` and `touch`, the device at the contact's start.
 
-    Returns  head: the contact's document, and `touch` and `scene`; arrays, at each sample: the encoder's `reading`
-             and the true `place` of the handle [m], the `force` [N], and the energy `made` by the wall [J]
+    Returns  head: the contact's document, and `touch` and `scene`, or `touch` with the reason why it is not drawn;
+             arrays, at each sample: `time` [s], the encoder's `reading` and the true `place` of the handle [m],
+             the `force` [N], the energy `made` by the wall [J]; and the layers' as `touch.NAME`, `scene.NAME`
     """
     state = request.state
     point = opened.point(state)
@@ -189,7 +190,7 @@ def export(opened: OpenedDevices, request: ExportRequest) -> Contents:
 
 
 def kept_figure(opened: OpenedDevices, request: ExportRequest) -> bytes:
-    """The chart as matplotlib draws it, with what it shows below."""
+    """The chart as matplotlib draws it, with what it shows below: a file of the request's format."""
     from matplotlib.figure import Figure
 
     from zwidth.show.figures.style import save
@@ -245,6 +246,7 @@ def python_lines(state: State, point: OperatingPoint) -> str:
     """Lines of Python that give the chart of a state."""
     lines = ["import zwidth", ""]
     arguments = [json.dumps(state.device)]
+    # `zwidth.load` takes a mapping, or a list where a number is unset
     settings = {path: value for path, value in state.settings.items() if value is not None}
     removed = [f"{path}=unset" for path, value in state.settings.items() if value is None]
     if settings and not removed:

@@ -110,7 +110,7 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     if device.mechanism:
         where = f"{typed(way(question.screw(device)))} at {vector(facts['position_m'], 'm')}"
         if (facts["projected_m"] or 0.0) > ROUNDING:
-            with speaking_of_moments(False):
+            with speaking_of_moments(False):  # a length, whatever is rendered
                 where += f" ({amount(facts['projected_m'], 'm')} from the requested position)"
         place = f"{where}, assembly {facts['assembly']}, {place}"
     held = f", held by {operator_text(facts['operator'])}" if facts["operator"] else ""

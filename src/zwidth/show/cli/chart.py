@@ -136,7 +136,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
 
 
 def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
-    """Rows (label, value) on the equilibrium of a device under load; none without load."""
+    """Rows (label, value) on the equilibrium of a device under load; none without load, or of other charts."""
     from zwidth.chart.chart import StabilityChart
     from zwidth.show.load_text import balance_rows
 
@@ -209,7 +209,7 @@ def unmeasured_warning(chart: MeasuredChart) -> str | None:
 def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     """Rows (label, value) on a chart by a frequency response, below those of every chart."""
     if chart.band is None:
-        if not chart.open:
+        if not chart.open:  # an open edge has no numbers
             yield "error", "not known: neither coherence nor repeated sweeps are given; these are nominal numbers"
     else:
         yield "of the mean response", _nominal_text(chart)

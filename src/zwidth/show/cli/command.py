@@ -185,7 +185,11 @@ class Command:
         return stated | self.repeated_options(case)
 
     def write(self, case: CommandLine, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
-        """Write the file, by its ending. Returns why there is no answer, be it that nothing can be written."""
+        """Write the file, by its ending.
+
+        reason   why there is no answer; None: there is one
+        Returns  `reason`; a command whose file may hold nothing, as a sound, returns why
+        """
         assert case.path is not None
         if case.writes(DATA):
             stated = document | ({} if reason is None else {"reason": reason})
@@ -264,7 +268,7 @@ class Command:
             return self.unanswered(case, NoAnswerError(f"this is undecided: {error}", decided=False))
 
     def _answer_of_result(self, case: CommandLine, result: Any) -> Answer:
-        """The answer that a result gives; writes the output file where one is named."""
+        """The answer that a result gives; writes the output file where one is named, and the command's others."""
         reason = self.reason(case, result)
         document = self.circumstances(case) | self.document(case, result)
         if self.answers_by_fit and case.device.response is not None:

@@ -150,7 +150,7 @@ RARE: Final[tuple[tuple[Callable[[], None], ...], ...]] = (
 
 def run_group(group: int) -> None:
     """Run what one group wants, and print the name of each kernel that was compiled for it."""
-    names = sys.stdout
+    names = sys.stdout  # kept, for what the commands print goes nowhere
 
     def listen(name: str, ended: bool) -> None:
         if ended:
@@ -164,7 +164,7 @@ def run_group(group: int) -> None:
                 invoke(shlex.split(line))
             for work in RARE[group]:
                 work()
-        os.chdir("/")
+        os.chdir("/")  # out of the folder, which is removed now
 
 
 if __name__ == "__main__":

@@ -54,12 +54,12 @@ class ParameterType(ParamType):
 
 
 def check_contact(options: Mapping[str, Any]) -> None:
-    """Raise click.UsageError for options that cannot stand together, as far as the device does not decide."""
+    """Raise click.UsageError for options that are missing or exclude each other, whatever the device is."""
     wall, environment = options["wall"], options["environment"]
     if wall is not None and environment is not None:
         raise usage_error("--wall and --environment exclude each other; leave one out")
     if environment is not None:
-        return
+        return  # what it takes is checked where it is made
     missing = [f"--{name}" for name in ("stiffness", "damping") if options[name] is None]
     if missing:
         raise usage_error(f"a wall needs --stiffness and --damping; missing: {' and '.join(missing)}")

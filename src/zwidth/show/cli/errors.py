@@ -38,8 +38,9 @@ class UnfinishedRun(errors.ZwidthError):
 def translate_errors(question: Question) -> Iterator[None]:
     """Turn errors of a computation inside this block into messages about the question as it was typed.
 
-    Raises  NoAnswerError  where the posture does not exist, or double precision cannot decide
-            BadInput  where the model, or the loop, does not fit the device
+    Raises  NoAnswerError  where posture or equilibrium does not exist, numbers are missing, or double precision
+                           cannot decide
+            BadInput       for arguments, or a load, direction, model, response or loop, that do not fit the device
     """
 
     try:
@@ -47,7 +48,7 @@ def translate_errors(question: Question) -> Iterator[None]:
     except errors.ArgumentError as error:
         option = f"{as_option(error.argument)}: " if error.argument else f"{question.name}: "
         raise BadInput(*(f"{option}{reason}" for reason in error.reasons)) from None
-    except errors.SidewaysForceError as error:
+    except errors.SidewaysForceError as error:  # an EquilibriumError that another load mends
         raise BadInput(f"{question.name}: load: {error}") from None
     except (errors.PostureError, errors.EquilibriumError) as error:
         raise errors.NoAnswerError(str(error)) from None
@@ -90,6 +91,7 @@ def explain(error: Exception) -> tuple[list[str], int]:
             return ["zwidth: interrupted"], INTERRUPTED
         case click.ClickException():
             return [_usage_line(error)], BAD_INPUT
+        # of writing to a stream: an error of a file has its name
         case OSError() if not os.environ.get(DEBUG) and error.filename is None:
             return [f"zwidth: standard output cannot be written: {error.strerror or error}"], BAD_INPUT
         case _:

@@ -272,10 +272,11 @@ def _gaps_text(points: list[MeasuredPoint]) -> str:
 def _cause_sentence(cause: Cause, width: float) -> str:
     """Sentence on one part of the device: how the measured edges move without it.
 
-    width  of the range of stable dampings [N s/m], which says whether a move matters
+    width  of the range of stable dampings [N s/m], which says whether a move matters; nan where it is not known
     """
     if not cause.comparisons or isnan(width):
         return f"without {cause.name} no edge could be compared"
+    # each a point, and the damping of the same edge without the part
     point, other = max(cause.comparisons, key=lambda pair: abs(pair[0].damping - pair[1]))
     if abs(point.damping - other) <= MATTERS * width:
         if cause.unpaired_count:
@@ -322,6 +323,7 @@ def _tried_wall_sentences(points: Sequence[ComparedPoint], verdict: str) -> Iter
     """Walls of which a verdict was seen: how many have it on the exact chart; of the others the farthest off."""
     if not points:
         return
+    # `agrees` is None for a wall that is undecided on the exact chart
     agreeing = sum(one.agrees is True for one in points)
     against = [one for one in points if one.agrees is False]
     text = f"{_count_text(len(points), 'wall')} seen {verdict}: {agreeing} {verdict} on the exact chart, too"

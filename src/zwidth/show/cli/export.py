@@ -130,7 +130,7 @@ class ExportCommand(Command):
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
-        if not (table.level > 0).any():
+        if not (table.level > 0).any():  # level 0: no safe wall
             if store is not None and case["store"] is None:
                 store.remove()
             raise NoAnswerError(f"no cell has safe walls: {'; '.join(table.reasons)}")

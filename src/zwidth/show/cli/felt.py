@@ -80,7 +80,7 @@ class FeltCommand(Command):
 
 
 def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
-    """Rows (label, value) on a wall: its verdict, what is felt at rest and in free motion, the limit at rest."""
+    """Rows (label, value) on a wall: its verdict, what is felt at rest and in free motion, and at rest at most."""
     from zwidth.measures.felt import LIMIT_HEADINGS, LIMIT_WORDS
 
     wall = f"{amount(felt_wall.wall_stiffness, 'N/m')}, {amount(felt_wall.wall_damping, 'N s/m')}"

@@ -90,7 +90,7 @@ def announce_compiling(command: str) -> Iterator[Callable[[], bool]]:
 
     Yields a function that says whether kernels are being compiled now
     """
-    progress: list[Progress] = []
+    progress: list[Progress] = []  # empty until the first kernel, then one
 
     def listen(name: str, ended: bool) -> None:
         """Announce the wait at the first kernel; count those that are compiled."""

@@ -149,7 +149,7 @@ class IdentifyCommand(Command):
         return reason
 
     def write_others(self, case: CommandLine, result: Identification) -> dict[str, Path]:
-        """The device file with the numbers, where that is wanted and there are some."""
+        """Write the numbers into the device file, with their sources, where that is wanted and there are some."""
         if not case["write"] or result.not_written or not result.settings:
             return {}
         from zwidth.device.address import edited_text

@@ -71,8 +71,11 @@ class LimitCyclesCommand(Command):
         }
 
     def compute(self, case: CommandLine) -> LimitCyclePrediction:
-        """The prediction. Raises NoAnswerError where nothing depends on the amplitude, BadInput without encoder
-        steps."""
+        """The prediction.
+
+        Raises  NoAnswerError  where nothing depends on the amplitude
+                BadInput       for --offset or --plane without encoder steps, and as `_device_in_plane`
+        """
         from zwidth.contact.wall_limit_cycles import amplitude_dependent, predict_limit_cycles
         from zwidth.errors import ArgumentError
 

@@ -132,7 +132,7 @@ def _device_without_push(case: CommandLine) -> Device:
 
 
 def _chart_row(step: PushedChart, free: float) -> list[str]:
-    """Cells on the chart under one push.
+    """Cells on the chart under one push: without a stable wall "none" alone; no change in the row without a push.
 
     free  largest stiffness without a push [N/m], from which the change counts
     """
@@ -152,7 +152,10 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
 
 
 def _balance_row(step: PushedChart) -> list[str]:
-    """Cells on the forces in balance under one push, and on the motion along the surface."""
+    """Cells on the forces in balance under one push, and on the motion along the surface.
+
+    All but the push are "" without an equilibrium; the last one, without a push.
+    """
     if step.wall_force != step.wall_force:  # nan: without an equilibrium
         return [typed(as_written(step.push, "N")), *[""] * 5]
     motion = step.sideways

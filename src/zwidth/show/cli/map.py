@@ -199,7 +199,11 @@ class MapCommand(Command):
 
 
 def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
-    """The measures to map, those of requirements too, of which the first is drawn; and the requirements."""
+    """Measures to map, and requirements. Raises BadInput.
+
+    Returns  the measures of --measure, --share and --require, each once, of which the first is drawn; those of
+             --require as requirements
+    """
     from zwidth.measures.catalogue import find_measure
     from zwidth.measures.user_measures import load_measures
     from zwidth.study.designs.column import parse_requirement
@@ -236,7 +240,10 @@ def _plane_option(name: str, value: str | None) -> str:
 
 
 def _plane(case: CommandLine) -> PlaneGrid:
-    """The plane and its cells that the options ask for. Raises as `Device.at` and `plane_of` do."""
+    """The plane and its cells that the options ask for.
+
+    Raises as `plane_of` does; as `Device.at` does, but not where posture or equilibrium do not exist
+    """
     from zwidth.errors import EquilibriumError, PostureError, SidewaysForceError
     from zwidth.study.workspace.plane_grid import plane_of
 
@@ -245,7 +252,7 @@ def _plane(case: CommandLine) -> PlaneGrid:
         device, direction = device.pushed_along_every_direction, None
     # an assembly that does not reach the reference position, or holds nothing there, may reach and hold others
     try:
-        device.at(direction=direction, assembly=assembly)  # raises what is wrong with its name
+        device.at(direction=direction, assembly=assembly)  # raises what is wrong with these arguments
     except SidewaysForceError:
         raise
     except (PostureError, EquilibriumError):
@@ -259,8 +266,9 @@ def map_page(
 ) -> Iterator[Any]:
     """The map in a few numbers: what and where, each measure over the workspace, requirements, notes.
 
-    document  of the map, as `study.workspace.map_data.map_document` makes it
+    document  of the map, as `study.workspace.map.map_document` makes it
     """
+    # the document of a single measure holds its numbers itself
     measures = document.get("measures") or {document["measure"]: document}
     yield _map_heading(dataset, device, list(measures))
     for name, entry in measures.items():
@@ -318,6 +326,7 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
         for key, title in (("conditioning_index", "conditioning index"), ("isotropy_index", "isotropy index")):
             if key in overall:
                 yield title, amount(overall[key])
+    # of each status, a byte, how many cells have it
     counts = np.bincount(status.ravel(), minlength=256)
     yield "cells", ", ".join(f"{counts[k]} {text}" for k, text in STATUS.items() if counts[k])
 

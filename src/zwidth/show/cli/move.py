@@ -147,7 +147,8 @@ def surface_of(options: Mapping[str, Any], device: Device) -> Surface | None:
 
 
 def moved_wall(options: Mapping[str, Any]) -> SurfaceRendering | None:
-    """What the computer renders at the surface. Raises BadInput for an environment that cannot be."""
+    """What the computer renders at the surface; None without one. Raises BadInput for an environment that cannot
+    be."""
     from zwidth.contact.mechanism.simulate_mechanism import SurfaceEnvironment, SurfaceWall
 
     gains = {name: options[name] for name in ("stiffness", "damping", "no_pull")}
@@ -392,7 +393,7 @@ def _result_rows(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterat
         yield "torque limits", _torque_limit_text(motion)
         if isfinite(motion.point.controller.force_limit):
             yield "force limit", _share_text(document["force_limit_share"])
-    size = float(np.max(np.abs(motion.position)))
+    size = float(np.max(np.abs(motion.position)))  # beside which rounding is seen
     yield "handle at the end", vector(_without_rounding(motion.position[-1], size), "m")
     path = float(np.sum(np.linalg.norm(np.diff(motion.position, axis=0), axis=1)))
     yield "path length", amount(path if path > ROUNDING_SHARE * size else 0.0, "m")
@@ -439,6 +440,7 @@ def _energy_table_rows(book: Mapping[str, float]) -> Iterator[tuple[str, str, st
     given["dry friction"] = book["friction"]
     if isnan(given["motors"]):
         known = given["hand"] + given["gravity"] + given["dry friction"]
+        # the row keeps its place
         given = {"motors and dampers, by difference" if name == "motors" else name: x for name, x in given.items()}
         given["motors and dampers, by difference"] = book["stored"] - known
     else:

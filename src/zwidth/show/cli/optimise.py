@@ -111,7 +111,10 @@ class OptimiseCommand(Command):
         return reason
 
     def write_others(self, case: CommandLine, result: Optimisation) -> dict[str, Path]:
-        """Write a device file for each design of the front, and remove those of an earlier, larger front."""
+        """Write a device file for each design of the front, and remove those of an earlier, larger front.
+
+        Without any front nothing but an empty folder is removed.
+        """
         if case["designs"] is None:
             return {}
         if not len(result.front):
@@ -166,7 +169,7 @@ def _check_designs(folder: Path, study: Study) -> None:
 
 
 def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
-    """Headings, and a row for the device as it is and for each design of the front."""
+    """Headings, and a row for the device as it is, where it was computed, and for each design of the front."""
     from zwidth.show.report.optimisation import short_names
     from zwidth.study.designs.sweep import axis_value_text
     from zwidth.study.optimisation.optimise import own_values

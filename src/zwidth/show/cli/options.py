@@ -127,7 +127,10 @@ class Question:
         return posture.position, float(posture.projected)
 
     def circumstances(self, device: Device) -> dict[str, Any]:
-        """Name, place and sampling as a result states them; null where inapplicable."""
+        """Name, place and sampling as a result states them; null where inapplicable.
+
+        Only `load` and `left_out` are no keys where there is nothing to state.
+        """
         from zwidth.loop.linear_omissions import load_omissions
 
         mechanism = device.mechanism is not None
@@ -263,7 +266,7 @@ class DirectionType(Numbers):
 def option(argument: Argument, kind: ParamType | None = None, **more: Any) -> Decorator:
     """The option of the command line that gives an argument.
 
-    kind  how its value is read; None: by the argument's own kind
+    kind  how its value is read; None: by the argument's own kind. A flag has no value
     more  arguments of `click.option` besides
     """
     one = argument
@@ -330,7 +333,8 @@ def about_a_device(command: Callback, loads: bool = True, device: Decorator = DE
 def about_a_workspace(command: Callback) -> Callback:
     """The same as `about_a_device` for a command about all postures.
 
-    Its argument `extreme` is the word for the direction chosen in each cell, such as "worst"; None: one is given.
+    The command's argument `extreme` is the word for the direction chosen in each cell, such as "worst"; None: one
+    is given.
     """
 
     @wraps(command)

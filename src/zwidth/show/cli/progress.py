@@ -26,7 +26,9 @@ def show_progress(busy: Callable[[], bool] | None = None) -> Iterator[Progress]:
     """Show what a command does, how much of it is done and about how long the rest takes, if it takes longer than
     two seconds: as bars on a terminal, else as lines, ever more rarely. Nothing where ZWIDTH_QUIET is set.
 
-    busy  whether another message says what is waited for; a stage of unknown length is then not mentioned
+    busy    whether another message says what is waited for; a stage of unknown length is then not mentioned;
+            None: never
+    Yields  what takes the stage, how much of it is done, and of how much (0: unknown)
     """
     if os.environ.get(QUIET):
         yield lambda stage, done, of: None

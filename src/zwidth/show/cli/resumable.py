@@ -39,6 +39,7 @@ def check_workers(options: Mapping[str, Any]) -> None:
 def open_store(job: Job, beside: Path | None, resume: str | None) -> Store | None:
     """Where a job's results are kept: in a folder of the user's, or beside the file that is written; else nowhere.
 
+    beside  the file that is written;   resume  the user's folder, which comes first
     Raises  BadInput  where there is no room, or something else is there
     """
     from zwidth.errors import StoreError
@@ -117,6 +118,7 @@ def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Itera
     """As `report_kept_work`, for work that is kept in a folder.
 
     folder  that keeps the finished work; None: none does;   begun  says whether there is any in it
+    Raises  UnfinishedRun  where a cluster or a process ended;   BadInput  for cluster or folder
     """
     from zwidth.errors import CannotStart, ClusterEnded, ClusterError, StoreError, WorkerLost
 
@@ -127,7 +129,7 @@ def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Itera
     )
     try:
         yield
-    except (KeyboardInterrupt, SystemError) as error:
+    except (KeyboardInterrupt, SystemError) as error:  # the latter for a ctrl-C in compiled code
         stopped = isinstance(error, KeyboardInterrupt) or stopped_in_a_kernel(error)
         if stopped and begun():
             say(f"zwidth: {goes_on}")

@@ -110,7 +110,10 @@ class RobustCommand(Command):
         return f"no wall with K > 0 and B >= 0 is stable for every member; {group}: {'; '.join(names)}"
 
     def pages(self, case: CommandLine, result: RobustStudy, document: Mapping[str, Any]) -> Iterator[Any]:
-        """Numbers of the robust set, and a row for each member that limits it."""
+        """Numbers of the robust set, and a row for each member that limits it, BINDING_ROWS at most.
+
+        Of a set without stable wall nothing but the doubt is said.
+        """
         if result.doubt:
             yield f"warning: this is undecided: {printable(result.doubt)}"
         if not result.chart.members_at_stiffness_max:
@@ -143,7 +146,7 @@ def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
         try:
             low, high = map(float, parts[:2] if logarithmic else parts)
         except ValueError:  # no numbers, or not two of them
-            equals = ""
+            equals = ""  # a fault
         if not equals or not path:
             lines.append(f"--range: must be PATH=LOW,HIGH or PATH=LOW,HIGH,log with two numbers, got {text!r}")
             continue
@@ -216,7 +219,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
 
 
 def _member_name(study: RobustStudy, member: int) -> str:
-    """A member by its operator, where members differ in nothing else; otherwise by its number."""
+    """A member by its operator or its sweep, where members differ in nothing else; otherwise by its number."""
     from zwidth.device.load import NOBODY
     from zwidth.study.robust.family import MEAN
 
@@ -235,7 +238,7 @@ def _share_text(share: float) -> str:
 
 
 def _members_text(study: RobustStudy) -> str:
-    """How many members were charted, and what searching the ranges for worse ones found."""
+    """How many members were charted, and of ranges what a search for worse ones found."""
     count, edge_change = len(study.members), f"{typed(uncertain(100 * study.area_change))} %"
     if study.violation is None:
         return (

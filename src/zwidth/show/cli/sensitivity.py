@@ -107,6 +107,7 @@ class SensitivityCommand(Command):
 
         goal, found = result.goal, result.sensitivities
         count = len(found.numbers if goal is None else goal.reached)
+        # inches: a row for each number, and room for three
         drawing, ax = figure(6.2, 0.9 + 0.27 * max(min(case["top"], count), 3))
         if goal is None:
             draw_sensitivities(ax, found, case["top"])
@@ -116,7 +117,7 @@ class SensitivityCommand(Command):
 
 
 def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
-    """Pages on the numbers that reach the goal, of which `top` are shown; if none does, on the nearest one."""
+    """Pages on the numbers that reach the goal, of which `top` are shown, and on the nearest of the others."""
     wanted = amount(goal.goal, "N/m")
     shown = goal.reached[:top]
     if shown:

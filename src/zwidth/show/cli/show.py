@@ -133,6 +133,7 @@ def _joint_table(mechanism: Mechanism, joints: Mapping[str, Any]) -> Any:
     from zwidth.model.mechanism import PRISMATIC
 
     units: dict[str, list[str]] = {}
+    # a joint of several coordinates has a link for each: those before the last are named LINK/1, LINK/2
     for name, kind in zip(mechanism.links.names, mechanism.links.joint, strict=True):
         units.setdefault(name.partition("/")[0], []).append("m" if kind == PRISMATIC else "rad")
     slides = any("m" in of_joint for of_joint in units.values())
@@ -175,7 +176,7 @@ def _dexterity_units(mechanism: Mechanism, result: Description) -> tuple[str, st
     turns = mechanism.controls == ORIENTATION
     jacobian = result.angular_jacobian if turns else result.jacobian
     assert jacobian is not None
-    rows = np.max(np.abs(jacobian), axis=1)
+    rows = np.max(np.abs(jacobian), axis=1)  # of a direction in which it cannot move: rounding
     directions = min(jacobian.shape[1], int(np.sum(rows > ZERO_ROW * np.max(rows))))
     power = {2: "²", 3: "³"}.get(directions, "")
     return ("", f"1/(kg m²){power}") if turns else (f"m{power}", f"1/(kg m){power}")
@@ -185,9 +186,10 @@ def _mode_texts(document: Mapping[str, Any]) -> Iterator[str]:
     """Each natural frequency with its damping; of many, as links that bend have, the highest of the rest alone."""
     frequencies = document["natural_frequencies_Hz"]
     ratios = document["damping_ratios"] or [None] * len(frequencies)
+    # two more than MODES_SHOWN would be no longer than the line that replaces them
     unshown = frequencies[MODES_SHOWN:] if len(frequencies) > MODES_SHOWN + 2 else []
     for frequency, ratio in zip(frequencies[: len(frequencies) - len(unshown)], ratios, strict=False):
-        if frequency is None:
+        if frequency is None:  # JSON has null for infinite and nan
             yield "unstable"
         else:
             yield amount(frequency, "Hz") + (f" ({typed(percent(ratio))})" if ratio is not None else "")

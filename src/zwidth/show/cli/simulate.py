@@ -107,7 +107,10 @@ class SimulateCommand(Command):
                 raise usage_error(f"--{name.replace('_', '-')} belongs to a sound; add --output FILE.wav")
 
     def compute(self, case: CommandLine) -> ContactSimulation:
-        """The simulated contact; wrong options become BadInput under their names."""
+        """The simulated contact; wrong options become BadInput under their names.
+
+        Fewer substeps than asked for, of a linear device, are told on standard error.
+        """
         from zwidth.contact.point_contact import simulate_contact
         from zwidth.show.sound import seconds_to_hear
 
@@ -268,7 +271,7 @@ def _result_rows(simulation: ContactSimulation) -> Iterator[Row]:
     no_growth = "too fast to determine" if simulation.given_up else "no motion is left"
     growth = f"{typed(signed(simulation.growth))} per sample" if isfinite(simulation.growth) else no_growth
     if simulation.predicted_growth is not None:
-        left = simulation.loop.plant.nonlinear.kinds
+        left = simulation.loop.plant.nonlinear.kinds  # what the eigenvalues leave out
         linear = " of the linear loop" if left or isfinite(simulation.force_limit) else ""
         growth += f"; by the eigenvalues{linear} {typed(signed(simulation.predicted_growth))}"
     yield "growth", growth

@@ -213,7 +213,7 @@ def _quantile_row(measure: MeasureQuantiles, drawn: int) -> list[str]:
     for quantile in measure.quantiles:
         interval = quantile.interval
         unit = spoken_unit(measure.unit)
-        if interval.low == interval.high:
+        if interval.low == interval.high:  # the value alone
             texts.append(amount(interval.value, unit))
             continue
         texts.append(
@@ -311,7 +311,7 @@ def _undecided_sentence(result: ToleranceStudy, shown: str, share: Interval) -> 
 
 
 def outcome_sentences(result: ToleranceStudy) -> Iterator[str]:
-    """Devices that are neither stable nor unstable, and those without any stable wall."""
+    """Devices that are neither stable nor unstable, those without stable wall or chart, and the first reasons."""
     count = result.question.samples
     if result.undecided and not result.question.has_wall:  # of a wall its own sentence tells it
         charts = f"{result.undecided} of {count} devices have a chart that rounding leaves undecided"

@@ -27,7 +27,7 @@ class MatrixType(ParamType):
         return "R1,R2,...|ROW;ROW;..."
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """One row as a list of numbers, several as a list of such rows; fails for rows of different lengths."""
+        """One row as a list of numbers, several as a list of such rows of one length; fails for all else."""
         if not isinstance(value, str):
             return value
         try:

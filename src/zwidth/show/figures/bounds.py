@@ -187,6 +187,8 @@ def _number_lines(
 ) -> None:
     """Write each line's numbers on it, where it is farthest from the other lines and their numbers.
 
+    Lines that are too small for that have one text at BESIDE, with a stroke to the largest stiffness of them.
+
     dampings  (DAMPINGS,) of every line [N s/m];   top  largest stiffness and damping of the view [N/m], [N s/m]
     """
     across = [np.column_stack([line.stiffness / top[0], dampings / top[1]]) for line in lines]
@@ -204,6 +206,7 @@ def _number_lines(
         places = (inside if len(inside) else across[k][np.isfinite(across[k]).all(axis=1)])[::-1]
         places = places[np.linspace(0, len(places) - 1, min(STEPS, len(places))).astype(int)]
         others = [other[np.isfinite(other).all(axis=1)] for n, other in enumerate(across) if n != k]
+        # of the places tried, the distance from other lines; OUTSIDE: there may be none
         clear = np.minimum(_nearest_distances(places, np.vstack([*others, np.full((1, 2), OUTSIDE)])), FAR)
         # numbers, which are wider than lines, count twice
         clear += 2.0 * np.minimum(_nearest_distances(places, np.vstack([*placed, np.full((1, 2), OUTSIDE)])), FAR)

@@ -88,6 +88,7 @@ def caption_of_result(result: Any) -> list[str]:
     linear = type(result).__name__ not in NONLINEAR
     if operating_point is not None:
         facts = facts_of_point(operating_point, linear=linear) | facts_of_wall(result) | facts_of_doubt(result)
+        # those of a polar chart go round a plane, which it shows itself
         facts |= {"directions": None} if type(result).__name__ in ROUND_A_PLANE else {}
         facts |= facts_of_members(getattr(result, "members", ()))
         return caption_of_facts(facts, operating_point.controller)
@@ -105,7 +106,10 @@ def caption_of_result(result: Any) -> list[str]:
 
 
 def facts_of_point(operating_point: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
-    """Facts of an operating point for a caption; without position and direction where there are many."""
+    """Facts of an operating point for a caption; without position and direction where there are many.
+
+    The operator is AS_GIVEN where it has no name; a "motor-mass" model states none, for its handle is held fixed.
+    """
     omitted = (operating_point.linear_omissions if linear else ()) + operating_point.load_omissions
     facts: dict[str, Any] = {"name": operating_point.name, "model": operating_point.model, "left_out": omitted}
     if operating_point.model != "motor-mass" and (

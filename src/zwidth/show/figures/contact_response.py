@@ -105,7 +105,7 @@ def name_time(ax: Axes, response: TimeResponse, window: tuple[float, float]) -> 
 
 
 def time_window(response: TimeResponse) -> tuple[float, float]:
-    """From when to when something happens at the wall [s]; the whole run if that is most of it."""
+    """From when to when something happens at the wall [s]; the whole run if that is most of it, or nothing."""
     time, reading = response.time, response.reading
     if len(time) < 2:
         return 0.0, float(time[-1]) if len(time) else 0.0

@@ -54,7 +54,7 @@ def measured_bars(points: Iterable[MeasuredPoint]) -> list[ErrorBarPoint]:
 
 
 def own_bars(points: Iterable[UserPoint]) -> list[ErrorBarPoint]:
-    """Points of somebody's own; one that names neither edge nor verdict is drawn as an edge."""
+    """Points of somebody's own; one that names neither edge nor verdict is drawn as a lower edge."""
     return [
         ErrorBarPoint(point.stiffness, point.damping, point.edge, point.stiffness_low, point.stiffness_high)
         if point.edge == "tip"

@@ -90,6 +90,7 @@ def _draw_sets(ax: Axes, guarantees: Guarantees) -> None:
     for name, (colour, dashes) in OUTLINES.items():
         if name in by_name:
             guarantee = by_name[name]
+            # without walls the legend names it all the same
             for n, ring in enumerate(guarantee.region.rings or (np.full((1, 2), np.nan),)):
                 text = "" if n else _legend_text(guarantee)
                 ax.plot(*ring.T, color=colour, linestyle=dashes, zorder=3.0, label=text)
@@ -138,7 +139,7 @@ def _draw_set(ax: Axes, guarantee: Guarantee, look: tuple[str, str, Any, float],
     """
     fill, edge, dashes, above = look
     rings, text = guarantee.region.rings, _legend_text(guarantee)
-    if not rings:
+    if not rings:  # for the legend alone
         ax.plot([], [], color="none", label=text)
         return
     outline = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
@@ -154,7 +155,7 @@ def _draw_coupling_set(ax: Axes, region: Region, text: str, look: tuple[str, str
     look  fill, hatch and colour of the edge
     """
     fill, hatch, edge = look
-    if not region.rings:
+    if not region.rings:  # for the legend alone
         ax.plot([], [], color="none", label=text)
         return
     outline = Path.make_compound_path(*(Path(ring, closed=True) for ring in region.rings))

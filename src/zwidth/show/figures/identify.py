@@ -79,6 +79,7 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
     ax.set_yticklabels(["0"] * len(measured))
     style.label(ax.xaxis, "Time", "s")
     ax.set_ylabel("Torque over its largest")
+    # of the first sentence on what was left out, what stands before its reasons
     for text in identification.left_out[:1]:
         ax.text(0.01, 0.01, text.partition(":")[0], transform=ax.transAxes, fontsize=6.5)
     style.legend_above(ax, columns=2)
@@ -162,7 +163,7 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
         label="measured: force less inertia",
         zorder=1.5,
     )
-    free = identification.details.get("force") is None
+    free = identification.details.get("force") is None  # not driven: friction is known over mass alone
     reach = WIDEST * float(np.max(np.abs(velocity), initial=0.0)) or 1.0
     # level of the dry friction and slope of the viscous one, by the sign of the velocity
     for (level, slope), side, colour, name in (
@@ -290,7 +291,7 @@ BESIDE: Final = 2.0  # times the coherent response, above and below, that is sho
 
 
 def draw_response(ax: Axes, identification: Identification) -> None:
-    """|P| of each sweep with its error at each frequency, and where it cannot be relied on.
+    """|P| of each sweep, of the first one with its error at each frequency, and where it cannot be relied on.
 
     The view is that of the coherent frequencies: elsewhere the noise is drawn as far as it lies in it.
     """
@@ -376,6 +377,7 @@ def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], of_drive: np.ndarray, 
 
     of_drive  (k,) which rows of the curves are of this drive
     """
+    # a stroke begins where its number, `motion`, changes
     starts = np.flatnonzero(np.diff(curves["motion"][of_drive])) + 1
     angle, torque = curves["angle_rad"][of_drive], curves["fitted_torque_Nm"][of_drive]
     for number, (first, behind) in enumerate(pairwise([0, *starts.tolist(), len(angle)])):

@@ -107,7 +107,11 @@ def _scale_growth(ax: Axes, visible: Floats, *, crossings: bool) -> None:
 
 
 def _amplitude_range(balance: HarmonicBalance, cycles: Sequence[LimitCycle]) -> tuple[float, float]:
-    """Smallest and largest amplitude that are drawn [m], by AROUND, the limit cycles, BEYOND, and the range."""
+    """Smallest and largest amplitude that are drawn [m].
+
+    Those with a growth rate, as far as AROUND times from the limit cycles within range, and up to BEYOND times the
+    range, unless little would be left.
+    """
     amplitude, farthest = balance.amplitude, BEYOND * balance.largest_motion
     amplitudes = [cycle.amplitude for cycle in cycles if cycle.within_range]
     swings = amplitude[np.isfinite(balance.growth)]

@@ -138,12 +138,15 @@ def _few_ticks() -> Any:
 
 
 def _edge_pieces(chart: StabilityChart, low: float) -> Iterator[tuple[Floats, Floats]]:
-    """Pieces of a chart's edge from its exact curve, (K [N/m], B [N s/m]), nan in K far below `low`."""
+    """Pieces of a chart's edge from its exact curve, (K [N/m], B [N s/m]), nan in K far below `low`.
+
+    Straight pieces, of real roots, are those of the chart, without nan; pieces wholly below `low` are left out.
+    """
     tracer, hertz = tracer_of(chart.loop), 1.0 / (2.0 * pi * chart.loop.period)
     for arc in chart.boundary:
         near = np.flatnonzero(arc.stiffness >= low)
         if not len(near):
-            near = np.array([int(np.argmax(arc.stiffness))])
+            near = np.array([int(np.argmax(arc.stiffness))])  # the exact curve may reach higher than its points
         first, last = max(int(near[0]) - 1, 0), min(int(near[-1]) + 1, len(arc.frequency) - 1)
         ends = arc.frequency[first], arc.frequency[last]
         if ends[0] == ends[1]:  # a straight line of real roots

@@ -97,7 +97,7 @@ def draw_map(
     if (np.abs(values) <= style.LARGEST).any():
         drawn = values if outline is None else continued(values, dataset[f"{name}_status"].values)
         _draw_contours(ax, x, y, values, drawn, str(about["title"]), unit, faint=area is not None, outline=outline)
-    elif not np.isnan(values).all():
+    elif not np.isnan(values).all():  # infinite wherever it has a value
         handles += _fill_infinite(ax, x, y, values, str(about["title"]))
     handles += _status_hatches(ax, x, y, dataset[f"{name}_status"].values)
     handles += _direction_strokes(ax, dataset, f"{name}_direction")
@@ -150,7 +150,9 @@ def _draw_contours(
 ) -> None:
     """Bands between round levels of the values, cut at the true edge of reach where that is known.
 
+    x, y     places of the values (columns,), (rows,) [m];   values  (rows, columns), for the levels
     drawn    the values, continued beyond that edge
+    title    of the bar of colours, with `unit`;   faint  for outlines to stand out on it
     outline  what is reached; None: known to a cell
     """
     levels, norm, colours = style.bands_of(values, faint=faint)
@@ -298,13 +300,13 @@ def _draw_mechanism(ax: Axes, mechanism: ProjectedMechanism) -> None:
         ax.plot(*stroke.T, color=style.BLACK, linewidth=1.6, solid_capstyle="round", path_effects=halo, zorder=3.0)
     round_: dict[str, Any] = {"marker": "o", "markersize": 5.0, "color": "white", "markeredgecolor": style.BLACK}
     ax.plot(*joints.T, linestyle="none", zorder=3.1, **round_)
-    square: dict[str, Any] = {
+    diamond: dict[str, Any] = {
         "marker": "D",
         "markersize": 6.0,
         "color": style.VERMILION,
         "markeredgecolor": "white",
     }
-    ax.plot(*handle[:, None], linestyle="none", zorder=3.2, **square)
+    ax.plot(*handle[:, None], linestyle="none", zorder=3.2, **diamond)
 
 
 def _draw_rendered_direction(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None:

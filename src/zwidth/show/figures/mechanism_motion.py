@@ -193,16 +193,19 @@ def _cut_text(motion: MechanismMotion, cut: tuple[int, float]) -> str:
 
 
 def _surface_corners(surface: Surface | None, size: float) -> Floats | None:
-    """Two opposite corners (2, 3) [m] of a surface smaller than `size` [m]; None for others, and for a plane."""
+    """Two opposite corners (2, 3) [m] of a surface smaller than `size` [m]; None for others, and for a plane.
+
+    Of a box as if it lay along the axes of the base frame
+    """
     match surface:
         case Sphere():
             center, half = surface.center, np.full(3, surface.radius)
-        case Box():
+        case Box():  # one in a plane has two half sizes
             center, half = surface.center, np.array([*surface.half_sizes, 0.0][:3])
         case _:
             return None
     middle = np.array([*center, 0.0][:3])
-    half = np.where(np.isfinite(half), half, 0.0)
+    half = np.where(np.isfinite(half), half, 0.0)  # the view need not hold an infinite side
     return np.array([middle - half, middle + half]) if np.max(half) < size else None
 
 
@@ -227,7 +230,7 @@ def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
 
 
 def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMotion) -> None:
-    """Shade the wall and draw its edge, cut at one place of the axis that is looked along."""
+    """Draw the wall's edge and, unless it is two-sided, shade it; cut at one place of the axis of view."""
     if motion.surface is None:
         return
     cut = _cut_plane(motion, flat)
@@ -427,7 +430,7 @@ def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
                 for start, to in ((a, b), (b, a))
                 if np.linalg.norm(start - place) <= near < np.linalg.norm(to - start)
             ]
-    around = np.unique(np.array(angles or [np.pi]))
+    around = np.unique(np.array(angles or [np.pi]))  # a line to the left leaves the right free
     gaps = np.diff(around, append=around[0] + 2.0 * np.pi)
     widest = int(np.argmax(gaps))
     middle = around[widest] + 0.5 * gaps[widest]

@@ -130,6 +130,7 @@ def draw_validity(ax: Axes, validity: Validity) -> None:
     for fit, (colour, dashes) in zip(
         (fit for fit in validity.fits if len(fit.error)), style.LINES[1:] + style.LINES[:1], strict=False
     ):
+        # an error beyond the axis is drawn at its end
         frequency, error = _with_gaps(fit.frequency, 100.0 * np.clip(fit.error, 1e-4, 10.0), validity.arc)
         ax.plot(frequency, error, color=colour, linestyle=dashes, label=fit.label)
     ax.set_xscale("log")

@@ -371,6 +371,7 @@ def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]
     ranked = sorted(lengths, key=lambda member: -lengths[member])
     named = [member for member in ranked if lengths[member] > least_length][:NAMED]
     others = sum(length for member, length in lengths.items() if member not in named)
+    # texts that the legend has; others that bind next to nothing have none
     drawn = {"limited by others"} if others <= least_length else set[str]()
     for arc in chart.boundary:
         place = named.index(arc.member) if arc.member in named else NAMED

@@ -65,7 +65,7 @@ def study_figure(dataset: xr.Dataset) -> Figure:
     One axis, or one and a few texts such as assemblies: curves over it, a panel for each column. Two axes of
     numbers: heat maps. All else, and what a Latin hypercube has found: parallel coordinates.
 
-    dataset  as `study.designs.sweep_data` makes it
+    dataset  as `study.designs.sweep.sweep_dataset` makes it
     """
     names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
     numeric, texts = _split_axes(dataset, names)
@@ -201,7 +201,10 @@ class TicksAbove(AutoLocator):
 
 
 def _draw_missing(ax: Axes, x: NDArray[Any], missing: Sequence[tuple[str, NDArray[np.uint8]]]) -> None:
-    """Draw a row of symbols below all lines for each that has gaps: its colour, and the status (k,) at x (k,)."""
+    """Draw a row of symbols below all lines for each line that has gaps, at the x (k,) of its gaps.
+
+    missing  colour of each such line, and its status (k,)
+    """
     if not missing:
         return
     low, high = ax.get_ylim()
@@ -325,6 +328,7 @@ def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
 def _heat_figure(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], texts: Sequence[str]) -> Figure:
     """A heat map over both `axes` for each column and combination of `texts`; those of a column share colours."""
     choices = list(_combinations(dataset, texts))
+    # a row for each column, or of maps without texts two in a row
     wide = len(choices) if len(choices) > 1 else min(2, len(names))
     high = len(names) if len(choices) > 1 else -(-len(names) // wide)
     maps = [(name, chosen) for name in names for chosen in choices]
@@ -348,8 +352,9 @@ def draw_heat_map(
 ) -> list[int]:
     """One column over two axes of numbers, a cell for each design; hatched where there is no value.
 
-    scale    values that the colours span; left out: those shown
-    Returns  the statuses that are hatched
+    first, second  keys of the axes across and up
+    scale          values that the colours span; left out: those shown
+    Returns        the statuses that are hatched
     """
     x, y = (_cell_edges(dataset[key]) for key in (first, second))
     column = dataset[name].transpose(second, first)

@@ -121,7 +121,9 @@ def felt(found: Bending, *, loaded: bool = False) -> str:
 
 
 def first_mode(found: Bending, *, held: bool = False) -> str:
-    """Sentence on which way bending moves the frequency of the first mode that a wall moves; "" without modes.
+    """Sentence on which way bending moves the frequency of the first mode that a wall moves.
+
+    "" where there is none, and with bending links no chart
 
     held  whether somebody holds the handle, who is left out here
     """
@@ -146,7 +148,7 @@ def first_mode(found: Bending, *, held: bool = False) -> str:
 def tubes(facts: Facts) -> list[Row]:
     """Link, length, diameter, wall and share of the link's mass of each tube that is assumed, as texts.
 
-    [] where the file gives the beams
+    [] where the file gives the beams, and where no link could bend
     """
     found = facts.bending
     with speaking_of_moments(False):  # these are lengths, whatever is rendered

@@ -26,7 +26,7 @@ WIDTHS: Final = {"wide": 6.2, "narrow": 3.75}  # class of the page's style sheet
 
 
 def svg_figures(facts: Facts) -> dict[str, str]:
-    """Name -> HTML of both drawings; "" for a figure that does not apply to this device."""
+    """Name -> HTML of both drawings, wide and narrow; "" for a figure that does not apply to this device."""
     device, chart, plant = facts.device, facts.chart, facts.loop.plant
     drawn = {
         "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
@@ -85,6 +85,7 @@ def _sensitivities(facts: Facts) -> str:
     rows = len(facts.sensitivities.ranking[:TOP])
     if not rows:
         return ""
+    # inches
     height, narrow_height = (0.8 + row * max(rows, 2) for row in (0.24, 0.33))  # paths on two lines
     return _svg(
         "sensitivities",

@@ -140,7 +140,7 @@ def _charts_drawing(found: Optimisation) -> str:
             point = worst_point(found.problem, design, cells)
             charts[name] = stability_chart(point.loop, decay=False).drawn()
         except (DeviceError, ValueError, ChartError):
-            continue
+            continue  # the other one is drawn alone
     if not any(chart.regions for chart in charts.values()):
         return ""
 
@@ -232,7 +232,7 @@ def _finer_grid_sentences(found: Optimisation) -> list[str]:
     for demand in problem.demands:
         with np.errstate(invalid="ignore"):
             kept = margins(found.finer.values[:, demand.column], demand.bound, demand.at_least) >= 0.0
-        if broken := int((~kept).sum()):
+        if broken := int((~kept).sum()):  # a design without a value breaks it, too
             verb = "breaks" if broken == 1 else "break"
             sentences.append(f"on a grid twice as fine {plural(broken, 'design')} {verb} {demand.text}")
     return sentences or ["a grid twice as fine gives the same values"]

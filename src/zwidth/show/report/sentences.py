@@ -160,6 +160,7 @@ def _cause(facts: Facts, best: Variant) -> str:
         mass = float(facts.effective.rigid_mass)
         mass_text = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg')}"
         return f"the sampling of {mass_text} at {as_written(1.0 / controller.sampling_period, 'Hz')}"
+    # twice the damping
     return "its low structural damping" if flexible else "its low friction"
 
 
@@ -348,10 +349,10 @@ def first_change(facts: Facts) -> str:
     candidates = _changeable_numbers(facts)
     if not candidates:
         return ""
-    (path, value), *rest = candidates[:3]
-    gain = quantity(0.01 * abs(value) * facts.base.stiffness_max, "N/m")
-    share = f"{percent(0.01 * abs(value))} more stiffness"
-    text = f"What to change first is {path}: {ONE_PERCENT} {_more_less(value)} of it gives {share}, {gain}"
+    (path, first_slope), *rest = candidates[:3]
+    gain = quantity(0.01 * abs(first_slope) * facts.base.stiffness_max, "N/m")
+    share = f"{percent(0.01 * abs(first_slope))} more stiffness"
+    text = f"What to change first is {path}: {ONE_PERCENT} {_more_less(first_slope)} of it gives {share}, {gain}"
     if not rest:
         return f"{text}."
     others = [
@@ -499,7 +500,7 @@ def _share_text(frequency: float, validity: Validity) -> str:
 
 
 def setting(facts: Facts) -> str:
-    """Assembly, model, operator, and how the loop is sampled, delayed and filtered."""
+    """Assembly, model, operator, load, and how the loop is sampled, delayed and filtered."""
     model = f"{facts.model.capitalize()} model" if facts.model != "full" else "Plant as given"
     if facts.posture is not None:
         model = f"Assembly {facts.posture.assembly}, {facts.model} model"
