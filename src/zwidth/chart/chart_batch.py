@@ -138,6 +138,7 @@ def fill_numbers(
 
     memory  as a loop before this one has left it; where `sizes[COMPUTER]` is -1, no computer's number, all
             is filled in anew
+    radius  of the circle of the chart; 1: that of stability
     """
     if loops.section_count[i] == 0 or degree_of(loops, i) > MOST_DEGREE:
         return

@@ -72,7 +72,7 @@ def fill_nodes(memory: EdgeMemory, k: int) -> int:
 
 @compiled_lean
 def read_numbers(memory: EdgeMemory) -> bool:
-    """Put the numbers of the rings of arcs into `numbers`; False where one is in doubt.
+    """Put the numbers of the rings of arcs into `numbers`; False where one is in doubt, or memory is full.
 
     The stiffest wall, with t of both roots on the circle there, goes into `peak`.
     """
@@ -192,7 +192,7 @@ def _read_curve(memory: EdgeMemory, k: int, scale: float) -> bool:
 @compiled_lean
 def _may_rise(memory: EdgeMemory, n: int, i: int) -> bool:
     """Whether K can be larger between nodes i - 1 and i than the largest stiffness found: a parabola rises above
-    its ends by an eighth of its second difference at most, and four times that is allowed."""
+    its ends by an eighth of its second difference at most, and four times that is allowed. n: number of nodes."""
     K, bend = memory.picked[K_ROW], 0.0
     rise = K[i] - K[i - 1]
     if i > 1:

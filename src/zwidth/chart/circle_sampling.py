@@ -206,6 +206,7 @@ def fill_samples(
 ) -> int:
     """Samples t whose steps of theta are `share` of the distance to the nearest point, and at most `longest`.
 
+    radius    rho of the circle
     near_end  how near to the ends 0 and pi to begin and end, in shares of the distance of the nearest point there
     Returns   their number; the length of `out` where that is too short
     """
@@ -282,7 +283,8 @@ def _samples_beside_points(points: Complexes, found: Features, share: float, lon
 @compiled_lean
 def add_samples_around_crossings(circle: CircleFactors, count: int, t: Floats) -> int:
     """Add samples to the first `count` of t where a branch crosses an axis (K = 0 or B = 0) between two of them,
-    geometrically about the crossing, in their order. Returns the new number, or len(t) where that is too short.
+    geometrically about the crossing, in their order, for MOST_CROSSINGS at most. Returns the new number, or len(t)
+    where that is too short.
 
     Where the velocity estimate is all but blind (far above a filter's cutoff), B runs from one end of the plane to
     the other within a sliver of angle. Every such branch crosses an axis.

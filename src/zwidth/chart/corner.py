@@ -199,7 +199,8 @@ def _corner_by_halving(memory: EdgeMemory, on: float, off: float) -> tuple[float
 @compiled_apart
 def solve_crossing(circle: CircleFactors, one: float, other: float) -> tuple[float, float, bool]:
     """The two t = tan(theta/2) at which the curve has the same wall, by Newton's method from t = one and t = other
-    close by; and whether it settled: False if it wanders off, if the walls stay apart, or if both t are one."""
+    close by; and whether it settled: False if it wanders off, which leaves `one` and `other` as they were, if the
+    walls stay apart, or if both t are one."""
     a, b = one, other
     settled = False
     for _ in range(30):

@@ -45,7 +45,7 @@ CLOSEST: Final = 1e-9  # share of t within which two places on the curve are one
 @compiled_lean
 def fill_loop(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
     """Fill in the factors, polynomials and singular points of loop i on |z| = radius. What its computer alone
-    decides is kept from the loop before, if that has the same one."""
+    decides is kept from the loop before, if that has the same one and was filled in for the same circle."""
     circle, computer = memory.circle, loops.computer[i]
     if circle.sizes[COMPUTER] != computer or circle.radius[0] != radius:
         fill_computer(loops, computer, radius, circle)
@@ -66,7 +66,8 @@ def fill_without_singularities(loops: LoopTable, i: int, radius: float, memory: 
 
 @compiled_apart
 def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float) -> bool:
-    """Put samples of the curve with their walls, not yet flagged, into memory; False where it is full.
+    """Put samples of the curve with their walls, not yet flagged, into memory; False where it is full, or there
+    are fewer than two.
 
     share, longest, near_end  as for `circle_sampling.fill_samples`
     """

@@ -141,7 +141,7 @@ class ModalPlant:
 
     def natural_rates(self) -> Floats:
         """|Im s| [1/s] of the poles, at which the response to steady vibration turns sharply."""
-        # states: the modes' amplitudes, their rates, and the lagged velocities of the dampers
+        # states: the modes' amplitudes, their rates, and the dampers' lagged velocities times sqrt(damping)
         n, k = len(self.squared), len(self.lags)
         A = np.zeros((2 * n + k, 2 * n + k), dtype=complex)
         A[:n, n : 2 * n] = np.eye(n)
@@ -282,7 +282,7 @@ def _refine_angles(
     sampled: SampledResponse, thetas: Floats, P: Complexes, integrators: int
 ) -> tuple[Floats, Complexes]:
     """The angles and P (n,) there, refined until P is interpolated to INTERPOLATION_ERROR and its rounding in each
-    middle, steps are FINEST, or there are MOST_SAMPLES."""
+    middle, steps are FINEST, or there are MOST_SAMPLES. integrators: of `interpolate_response`."""
     # steps between two angles whose middle is not yet known to be interpolated well
     unsure = np.ones(len(thetas) - 1, dtype=bool)
     while unsure.any() and len(thetas) < MOST_SAMPLES:

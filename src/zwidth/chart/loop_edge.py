@@ -231,9 +231,10 @@ class LoopEdge:
         """The edge with points so dense that chords lie on it.
 
         An outline crosses itself where a small loop of the curve lies between two samples: then the curve is
-        traced again, also at the angles of the outline's points.
+        traced again, also at the angles of the outline's points; where that cannot be closed it stays as it is.
 
-        Raises  ChartError  if walls on it are not at the limit of stability
+        Raises  ChartError  if walls on it are not at the limit of stability, and tracing it again does not help or
+                            changes its numbers
         """
         edge = TracedEdge(self.arcs, {0: self.tracer}) if self.judged is None else self.judged
         again, blur = edge, self.blur

@@ -239,7 +239,8 @@ def combine(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> No
 
 @compiled_lean
 def deflate(room: Floats, degree: int, square: float) -> None:
-    """Divide p (rows 0, 1) by s^2 + square, whose roots it has; the quotient goes into rows 2 and 3.
+    """Divide p of a degree (row 0, sizes of its terms in row 1) by s^2 + square, whose roots it has; the quotient
+    and its sizes go into rows 2 and 3.
 
     Composite deflation (Peters and Wilkinson 1971): from both ends towards the largest term, which is stable
     wherever the divided roots lie among the others.

@@ -169,6 +169,7 @@ def _edge_goes_on(memory: EdgeMemory) -> bool:
     if other == peak[PEAK_T]:  # no corner
         return False
     if 0.0 < other < np.inf:
+        # the share by which t goes on towards larger K
         stiffer = BESIDE if wall_with_slopes(circle, other)[2] > 0.0 else -BESIDE
         return edge_flag(memory, other * (1.0 + stiffer)) >= 0
     # along the line of the real root, a + s K + v B = 0

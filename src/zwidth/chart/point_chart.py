@@ -153,7 +153,10 @@ def _is_held(point: OperatingPoint, model: Model) -> bool:
 
 
 def _modes_without_operator(point: OperatingPoint, model: Model) -> RenderedModes:
-    """Modes of all points' plants, without operator, by the given plant or by the mechanism in its postures."""
+    """Modes of all points' plants, without operator, by the given plant or by the mechanism in its postures.
+
+    model  of the mechanism; the callers have found that it can be computed for all postures at once
+    """
     if point.given_plant is not None:
         return plant_modes(point.given_plant, point.shape)
     assert point.mechanism is not None

@@ -140,7 +140,8 @@ def largest_stiffness_by_direction(
                 along each direction, and a direction and its opposite differ
     directions  (k, 3)  of any length but zero
     progress    called with "directions", those that are done, and all of them
-    Raises      ValueError  for a direction without length, and what `OperatingPoint.plant_of_directions` raises
+    Raises      ValueError  for directions that are not (k, 3) or have no length, and what
+                            `OperatingPoint.plant_of_directions` raises
     """
     check_kind("point", point, OperatingPoint)
     given = np.atleast_2d(np.asarray(directions, dtype=float))

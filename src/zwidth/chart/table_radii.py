@@ -70,7 +70,8 @@ def slowest_roots(
 
 
 def _radii(loops: LoopTable, which: Ints, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
-    """Spectral radii (p,) of walls K, B (p,), and leverages (p,) of `radii_and_leverages` if wanted, else nan."""
+    """Spectral radii (p,) of walls K, B (p,), each for the loop number `which` (p,), and leverages (p,) of
+    `radii_and_leverages` if wanted, else nan."""
     radii, leverages = np.full((2, len(which)), np.nan)
     for walls, states in _batches(loops, which):
         with np.errstate(over="ignore", invalid="ignore"):

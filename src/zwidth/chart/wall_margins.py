@@ -77,6 +77,7 @@ def stiffness_with_margins(
     """The stiffest wall of each of N devices with margins, and FOUND, NO_WALL or DOUBTFUL.
 
     loops   (delays * N) of them: all devices at the first delay, then all at the next, and so on
+    delays  number of delays at which each device's wall must be stable
     stiffness_margin, damping_margin  (N,)  shares
     Returns (N, 2) stiffness and damping [N/m], [N s/m], nan where none is FOUND; (N,)
     """

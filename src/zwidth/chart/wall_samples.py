@@ -296,7 +296,10 @@ def _divide_out_pair(polynomials: Floats, N: int, middle: int, n: int, w: Floats
 @compiled_lean
 def _mark_by_routh(degree: int, n: int, w: Floats) -> None:
     """`loop_polynomials.hurwitz` of the quotients by one bound for the whole of Routh's array: OUTSIDE is set to 1
-    where a root is outside for certain, else UNSURE to 1 where that does not settle it."""
+    where a root is outside for certain; where it stays 0, UNSURE is 1 if that does not settle it.
+
+    degree  of the quotients, n of them
+    """
     top = COEFFICIENTS + degree * LANES
     # first RATIO is the sign of the leading coefficient; SHARE is the relative error of all entries of the array
     for k in range(n):

@@ -258,7 +258,8 @@ def _disks_through(disks: Disks, nodes: Ints, scale: float, below: DisksBetween 
 
 
 def _best_kind(nodes: Floats, centres: CubicPieces, ratio: CubicPieces, forms: tuple[CubicPieces, ...]) -> Ints:
-    """Which interpolation (n - 1,) makes the disks least larger, near |p| = 1, in the middle of each interval."""
+    """Which interpolation makes the disks least larger in the middle of each interval (n - 1,): the kind of centre
+    (see `_centre_and_error`), or CENTRES plus the number of a form."""
     middle = 0.5 * (nodes[1:] + nodes[:-1])
     middle[MIRRORED - 1] = 0.5 * nodes[MIRRORED]  # of the stretch down to 0 itself
     growth = []

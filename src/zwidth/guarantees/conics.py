@@ -291,7 +291,8 @@ def _piece_matrices(nodes: Floats, count: int) -> Floats:
 
 
 def _towards_zero(x: Floats, values: Floats, nodes: Floats) -> tuple[Floats, Floats]:
-    """The conic at angle 0 (6,), and panels below the lowest (m, 10, POINTS), extrapolated from that one.
+    """The conic at angle 0 (6,), and panels below the lowest (m, 10, POINTS), extrapolated from that one; m = 0
+    where the coefficients do not grow towards 0.
 
     x, values  log(angle) (POINTS,) of the lowest panel and the functions there (10, POINTS)
     nodes      `_panel_nodes`

@@ -127,7 +127,8 @@ def coupling_angles(loop: Loop, held: Floats) -> Floats:
 
 
 def coupling_region(demand: CouplingDemand, period: float) -> Region:
-    """The couplings that meet a demand for every passive environment: rings of [k_c, b_c].
+    """The couplings that meet a demand for every passive environment: a ring of [k_c, b_c]; empty where the demand
+    is not finite, or none with k_c > 0 meets it.
 
     Along a ray from 0 couplings meet it up to  min over angles of Re(1/Z_c)/conductance;  each angle asks for an
     ellipse, so that the set is convex.
@@ -203,8 +204,10 @@ def softest_limit(demand: CouplingDemand, wall_stiffness: float, wall_damping: f
         |a|^2 mu^2 + 2 Re(a* (x + q)) mu + |x|^2 + 2 Re(x* q) + |q|^2 - r^2 >= 0,     x = 1/Z_w
 
     and the best ratio b_c/k_c is searched for. At low angles |q| and r are many orders larger than what is left of
-    them, so that the power |q|^2 - r^2 is taken from `Demand.power`, and the root of a rising quadratic in the
+    them, so that the power |q|^2 - r^2 is taken from `demand.power`, and the root of a rising quadratic in the
     form without a difference.
+
+    wall_stiffness, wall_damping  K [N/m], B [N s/m];   period  T [s]
     """
     angles = demand.angles
     wall = 1.0 / coupling_impedance(wall_stiffness, wall_damping, angles, period)

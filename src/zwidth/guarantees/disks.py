@@ -127,7 +127,8 @@ def _with_feedforward(
 
         c' = (c - X conj q)/a,   r' = r/a,   X' = X/a,        a = 1 - 2 Re(c q) + X |q|^2,   X = |c|^2 - r^2
 
-    Radius inf where some passive operator makes a part of q vibrate, so that no wall is stable with all of them.
+    Where some passive operator makes a part of q vibrate no wall is stable with all of them: the radius is inf
+    there, the centre 0 and X -inf.
 
     Raises  ValueError  with feedback other than feedforward
     """

@@ -72,8 +72,11 @@ def _turning(own: CircleFactors, beside: CircleFactors, theta: float) -> float:
 
 @compiled
 def _touching_angles(own: CircleFactors, beside: CircleFactors, first: float, last: float, pieces: int) -> Floats:
-    """Angles (n,) between two others at which the curve turns back: where `_turning` changes its sign between the
-    ends of `pieces` pieces, poles left out, at which it grows as they are approached."""
+    """Angles (n,) from first to last at which the curve turns back: where `_turning` changes its sign between the
+    ends of `pieces` pieces, poles left out, at which it grows as they are approached.
+
+    own, beside  factors of the loop with the spring, and with one a little stiffer or softer
+    """
     out, n = np.empty(pieces), 0
     step = (last - first) / pieces
     before = _turning(own, beside, first)
@@ -142,9 +145,9 @@ def envelope_between(
 ) -> list[tuple[Floats, float, float]]:
     """The envelope between two touching points where it is near a shape.
 
-    Walks (n, 2), the stable side on their left, each with the shares of the springs at its ends. Where the
-    envelope does not join the points the list is empty, and the share of a spring between them is added to
-    `lost_shares`.
+    Walks (n, 2), the stable side on their left, each with the shares of the springs at its ends. Stretches far
+    from the shape are left out, and so are those whose ends the envelope does not join: of these the share of a
+    spring between is added to `lost_shares`.
 
     size   of the common set, for tolerances;   depth  how often the stretch may still be halved
     """

@@ -142,7 +142,10 @@ def _mu_below(a: float, b: float, D: float, ea: float, eb: float) -> float:
 
 @compiled
 def _largest_within(K: float, B: float, piece: Floats, wide: bool, best: float) -> float:
-    """The largest mu of a wall within a piece, or the best known if that is larger, by halving stretches of it."""
+    """The largest mu of a wall within a piece, or the best known if that is larger, by halving stretches of it.
+
+    piece, wide  as for `_conic_at`
+    """
     starts, widths = np.empty(DEPTH + 1), np.empty(DEPTH + 1)
     starts[0], widths[0], waiting = 0.0, 1.0, 1  # a stack of stretches, and how many of it are to be looked at
     while waiting > 0:
@@ -165,7 +168,10 @@ def _largest_within(K: float, B: float, piece: Floats, wide: bool, best: float) 
 
 @compiled
 def _largest_mu(K: Floats, B: Floats, angles: Floats, pieces: Floats, wide: Flags) -> tuple[Floats, Floats]:
-    """Largest mu over all angles (k,) of walls (k,), and the angle at the start of the piece it comes from."""
+    """Largest mu (k,) of walls (k,) over all angles, and the angle (k,) at the start of the piece it comes from.
+
+    angles, pieces, wide  of `Conics`
+    """
     count, n = len(K), len(pieces)
     out, at = np.zeros(count), np.zeros(count)
     a, b, D, size = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)  # at all ends of pieces

@@ -61,7 +61,11 @@ def _guarantees(
 ) -> Guarantees:
     """Every guarantee of a loop as far as its premises allow; the first that fails is why others are withheld: all
     but `robust`, and `stable`, which is withheld only where links bend under load. Premises that are not known
-    become warnings."""
+    become warnings.
+
+    robust    rings [K, B] of a robust chart's stable set; None: there is no such guarantee
+    progress  as in `spring_stable_region`
+    """
     moving = _without_idle_motions(loop)
     guarantees = list[Guarantee]()
     failing = next((each for each in premises if each.fails), None)

@@ -78,8 +78,8 @@ def _measured_samples(port: MeasuredPort, name: str) -> Complexes:
 
 
 def _alias_sums(port: MeasuredPort) -> tuple[Complexes, Floats]:
-    """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; the second inf at all
-    angles if they take in no power at one of them.
+    """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; if they take in no power
+    at one of those, the second is inf at all angles, and the first means nothing.
 
     All have the factor W theta of hold and delay. What lies beyond the modes is, without it, smooth in the angle.
     """

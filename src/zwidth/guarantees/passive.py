@@ -40,7 +40,8 @@ NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every passive operator
 
 
 def passive_region(loop: Loop, held: Floats | None = None) -> Region:
-    """The walls that are stable whatever passive linear operator holds the device.
+    """The walls that are stable whatever passive linear operator holds the device; empty, with a reason, where
+    there are none, the device alone is unstable, or they are not known with its feedback.
 
     loop  the device without operator; an operator attached to the plant counts as a part of the device
     held  (n,) coordinate held . x at which the operator holds it; left out: the plant's handle
@@ -178,7 +179,8 @@ def _stiffest(loop_gauge: Gauge, period: float, low: float, high: float) -> tupl
 
 
 def _stiffest_direction(loop_gauge: Gauge, period: float, low: float, high: float) -> float:
-    """The direction of the largest K in an interval in which it has one maximum; the least B of equal ones."""
+    """The direction, an angle from K T to B, of the largest K from low to high, between which it has one maximum;
+    of equal ones that of the least B."""
     ratio = (np.sqrt(5.0) - 1.0) / 2.0
     ends = (low, high)
 

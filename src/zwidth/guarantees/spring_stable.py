@@ -70,8 +70,8 @@ def nyquist_spring(loop: Loop) -> float:
 
 
 def nyquist_region(loop: Loop) -> Region:
-    """The walls that are stable with the Nyquist spring alone; empty, with a reason, where there is none, where
-    the device by itself is unstable, or where nothing damps the mode."""
+    """The walls that are stable with the Nyquist spring alone; empty, with a reason, where there is no such spring
+    or wall, where the device by itself is unstable, or where nothing damps the mode."""
     if (alone := stable_alone(loop)).fails:
         return empty_region(alone.reason)
     k = nyquist_spring(loop)
@@ -97,8 +97,9 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
     The charts of some springs are intersected, and what the springs between them sweep over is cut off along its
     envelope (see `envelope`). Walls 1e-5 of the set's size inside the edge are then tried with more springs, those
     among them whose mode looks, sampled, like the vibration at the edge; springs that fail are charted too, and
-    their neighbours' sweep is cut off, until none fails. The edge is known to about 1e-5 of the set's size, with
-    light modes to 5e-5; where springs fail to the last the region has a warning.
+    their neighbours' sweep is cut off, until none fails CLEAN rounds in a row. The edge is known to about 1e-5 of
+    the set's size, with light modes to 5e-5; where springs fail in the last of ROUNDS the region has a warning. It
+    is empty, with a reason, where no wall is left or the device by itself is unstable.
 
     progress  called with "springs at the handle", the rounds that are done, and the most that there can be; fewer
               are usual

@@ -116,7 +116,7 @@ def _by_roots(loop: Loop) -> Premise:
         return _premise(hidden <= SIGN / period, hidden)
     d, error = _eigenvalues(form.growth)
     neutral = zero_poles(states, loop.controller)
-    d[np.argsort(np.abs(d))[:neutral]] = 0.0
+    d[np.argsort(np.abs(d))[:neutral]] = 0.0  # those that are at z = 1 exactly, which rounding has moved
     excess = d.real + 0.5 * np.abs(d) ** 2  # (|z|^2 - 1)/2, next to the circle |z| - 1, without cancellation
     rate = max(float(np.max(np.log1p(2.0 * np.maximum(excess, 0.0)))) / (2.0 * period), hidden)
     if np.any(excess > np.maximum(BAND, error)) or hidden > SIGN / period:

@@ -58,7 +58,8 @@ def coupling_impedance(stiffness: ArrayLike, damping: ArrayLike, angles: Floats,
 
 
 def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
-    """h11, h12, h21 and h22 without the coupling, after Adams and Hannaford, at angles in (0, pi)."""
+    """h11, h12, h21 and h22 (k,) without the coupling, after Adams and Hannaford, at angles (k,) in (0, pi), of a
+    device that the operator holds along `held` (n,)."""
     w = 2.0 / loop.period * np.tan(angles / 2.0)
     s = 1j * w
     G = port_response(port(loop.plant, held), w)

@@ -56,7 +56,8 @@ def buzz_at(point: OperatingPoint, wanted: WantedWall) -> float:
 
 def _largest_over_threshold(point: OperatingPoint, K: float, B: float, offset: float) -> float:
     """Largest ratio of handle amplitude and threshold over the stable limit cycles on a wall K [N/m], B [N s/m];
-    0 without any, inf where vibration grows beyond the range. offset: its middle as a share of an encoder step."""
+    0 without any, inf where vibration grows beyond the range, or does not decay and settles in none. offset: its
+    middle as a share of an encoder step."""
     prediction = predict_limit_cycles(point, K, B, offset=offset, simulate=False)
     kept_up = [cycle for cycle in prediction.cycles if settles(cycle)]
     if prediction.leaves_range or (prediction.verdict == "unstable" and not kept_up):

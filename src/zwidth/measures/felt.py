@@ -268,7 +268,12 @@ def _motion_deviation(
 
 def _stiffness_and_mass(omega: Floats, motion: Complexes, deviation: Floats) -> tuple[float, float]:
     """k [N/m] and m [kg] of  Re S = k - m w^2 + c w^4,  S = 1/motion the dynamic stiffness at low w; nan for what
-    is uncertain by more than UNCERTAIN of it, and for both where fewer than FEWEST motions are CLEAR."""
+    is uncertain by more than UNCERTAIN of it, and for both where fewer than FEWEST motions are CLEAR.
+
+    omega      (k,)  w [rad/s], ascending
+    motion     (k,)  of the handle per newton of the hand [m/N]
+    deviation  (k,)  standard deviation of the motion; where one is 0 none is known: all motions count alike
+    """
     clear = deviation < CLEAR * np.abs(motion)
     if np.count_nonzero(clear) < FEWEST:
         return np.nan, np.nan

@@ -287,7 +287,7 @@ def _joint_torques(point: OperatingPoint, key: str) -> Floats:
 
 
 def _check_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
-    """The values (d,) of this key of the drives. Raises MeasureError where one is not finite, as if left out."""
+    """The drives' values (..., d) of this key. Raises MeasureError where one is not finite, as if left out."""
     missing = ~np.isfinite(values)
     if missing.any():
         first = int(np.argwhere(missing)[0][-1])

@@ -45,9 +45,9 @@ class Rods:
 def segment_distance(first: ArrayLike, last: ArrayLike, other_first: ArrayLike, other_last: ArrayLike) -> Floats:
     """Least distance between two straight segments.
 
-    The squared distance is convex in the places 0 <= s, t <= 1 along both: where the least of the unbounded lines
-    lies outside, it is the least of those from each of the four ends to the other segment (Ericson, Real-Time
-    Collision Detection, 2005, section 5.1.9, known at second hand).
+    The squared distance is convex in the places along both, each from 0 to 1: where the least of the unbounded
+    lines lies outside, it is the least of those from each of the four ends to the other segment (Ericson,
+    Real-Time Collision Detection, 2005, section 5.1.9, known at second hand).
 
     first, last, other_first, other_last  (..., 3)  ends of the segments [m]
     Returns  (...)  [m]; 0 where they cross; nan where an end is nan

@@ -456,8 +456,8 @@ def _check_frequencies(point: OperatingPoint, frequency: Floats) -> Callable[[In
 
 
 def _check_band(point: OperatingPoint, low: Floats, high: Floats) -> None:
-    """Raise MeasureError for a band [Hz] whose ends are in the wrong order, or that begins beyond half the
-    sampling frequency."""
+    """Raise MeasureError for a band [Hz] whose ends are in the wrong order at any point, or that begins at HIGHEST
+    of the sampling frequency or beyond."""
     half = HIGHEST / np.asarray(point.controller.sampling_period, dtype=np.float64)
     if np.any(high <= low):
         raise MeasureError(

@@ -174,7 +174,10 @@ def _condition(J: Floats, power: Floats, x: Floats) -> Floats:
 
 
 def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
-    """Slope of log kappa of the homogeneous Jacobian at the length e^x, against x."""
+    """Slope of log kappa of the homogeneous Jacobian at the length e^x, against x (...).
+
+    power, norm  as of `_powers`, and of `characteristic_length`
+    """
     H = J * np.exp(x[..., None, None] * power)
     # dH/dx = power * H, entry by entry
     U, s, V = np.linalg.svd(H, full_matrices=False)

@@ -47,7 +47,7 @@ def fastest_sideways_motion(point: OperatingPoint) -> SidewaysMotion | None:
     """The motion that no wall moves without load and that grows fastest, whether or not it counts for stability.
 
     point    a single one, under load or not. Without load a free motion is neutral
-    Returns  None where a wall moves or a hand holds all motions, and none grows
+    Returns  None where there is none: a wall moves or a hand holds all motions, and under load none grows
     """
     if point.load is not None:
         apart = point

@@ -44,7 +44,7 @@ def numbers_of(
     """Numbers of the wanted wall by their names, each as an array over many points (...), by their shape.
 
     what    what the measure needs them for, such as "a wanted wall"
-    Raises  MeasureError  where one is not given, or not allowed
+    Raises  MeasureError  where one is not given, or not allowed; stiffness and damping may be of either sign
     """
     values = [getattr(wanted, name) for name in names]
     if any(value is None for value in values):

@@ -106,6 +106,7 @@ def _fill_steepest_rates(
 ) -> None:
     """Fill out[first:last] with the steepest mean rates of devices `rows`, one after the other [N/m].
 
+    loops              of all devices, of which `rows` (n,) are numbers; all else has a row for each of these
     w2, drag, h, a, s  (n, ...)  W, D, handle, actuator and sensor of their modes, see the module
     delay, lag         (n,)  [samples], [s];   lagging  1 where the lag is the last factor of the loops' force path
     K, B               (n,)  of the walls
@@ -175,8 +176,7 @@ def _steepest_rate(
     if lag > 0.0:
         fastest = max(fastest, 1.0 / lag)
     # so many that in a quarter of the fastest vibration there would be FINEST, but no more than FINEST in a
-    # sample,
-    # or in each of the two parts that a delay makes of it
+    # sample, or in each of the two parts that a delay makes of it
     pieces = min(FINEST, 1 + int(2.0 * FINEST * fastest * T / np.pi))
     _fill_generator(w2, drag, h, a, hh, lag, A)
     early, late = (1.0 - fraction) * T / pieces, fraction * T / pieces

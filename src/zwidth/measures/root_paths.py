@@ -217,7 +217,10 @@ class _PathTracer:
         return crossings
 
     def crossing(self, path: int, at: int, outwards: bool) -> Crossing:
-        """The crossing between step `at` and the next, by Brent's method (1973)."""
+        """The crossing of path number `path` between step `at` and the next, by Brent's method (1973).
+
+        outwards  whether the path leaves the circle there
+        """
         from scipy.optimize import brentq
 
         (low, high), (z_low, z_high) = self.values[at : at + 2].tolist(), self.z[at : at + 2, path].tolist()

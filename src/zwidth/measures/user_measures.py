@@ -79,7 +79,8 @@ def measure(
     along   False: it does not depend on the rendered direction
     each    True: called with one point at a time; False: of many at once, returning an array of their shape
     source  publication or section of the formula
-    Raises  ValueError  for another `better`, and for arguments that are not a text of one line
+    Raises  ValueError  for another `better`, for arguments that are not a text of one line, and where it is
+            written without brackets, so that `unit` is the function
 
     What the function or its file prints goes to standard error: standard output holds the answer only.
 

@@ -72,8 +72,9 @@ def optimal_mass(
     wall_damping     (...)  B [N s/m], above 0
     stiffness        (...)  k_e between motors and links [N/m]
     sampling_period  (...)  T [s]
-    Returns          (...)  all broadcast; mass and radius nan unless B > K T/2 and the third root is at most rho.
-                            Of the masses that aliasing makes equal the largest, with W < pi
+    Returns          (...)  all broadcast; mass and radius nan unless B > K T/2, W < pi and no root is larger than
+                            rho, and where a number is out of its range, as the bound then is, too. Of the masses
+                            that aliasing makes equal the largest, with W < pi
 
     The walls B and C of the thesis's Fig. 5.11 (whose results it prints for each other):
 

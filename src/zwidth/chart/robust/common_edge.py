@@ -91,7 +91,8 @@ def _runs_on_arcs(
     """The walk round a polygon (k, 2) [K unit, B] in runs, each on one arc; the first begins where the
     arc changes, or at the first point if it never does.
 
-    segments, near  as for `_nearest_segments`
+    members         whose arcs these are
+    segments, near  their outlines' chords, and the largest distance from them, as for `_nearest_segments`
     """
     nearest = _nearest_segments(points, segments, near)
     # of each edge of the polygon: member and arc, and theta at both its ends

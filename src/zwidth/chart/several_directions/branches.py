@@ -113,7 +113,7 @@ def trace_branches(
 @np.errstate(all="ignore")
 def _link(equation: RootEquation, samples: BranchSamples, box: WallBox) -> tuple[Ints, list[_Fold], Flags]:
     """Number (N - 1, q) of the wall at the next parameter in which each continues, -1 for none; folds; and
-    which intervals (N - 1,) miss links."""
+    in which intervals (N - 1,) a wall near the box has neither a continuation nor a fold."""
     forward = _continuations(samples, box)
     # ahead, behind: walls near the box that lack a continuation there
     near = box.with_margin(AROUND).holds(samples.walls)
@@ -156,6 +156,7 @@ def _continuations(samples: BranchSamples, box: WallBox) -> Ints:
     # both slopes lead there: those of two walls that turn back miss nothing in their mean
     step = chord[n, k, best[n, k]]
     forwards[n, k] = (_cosine(slopes[n, k], step) > CLEAR) & (_cosine(slopes[n + 1, best[n, k]], step) > CLEAR)
+    # of walls all but in one place neither slopes nor chord tell more
     return np.where(forwards | (unrivalled & (length <= SAME)), best, -1)
 
 
@@ -223,6 +224,7 @@ def _joined_branches(samples: BranchSamples, forward: Ints, folds: list[_Fold]) 
     for start in [*(wall for wall, beside in ways.items() if len(beside) == 1), *ways]:
         if start not in left:
             continue
+        # came: number of the joint by which the walk has come to the wall `at`; -1 at its start
         at, came, walk = start, -1, [samples.point(start // q, start % q)]
         while True:
             left.discard(at)

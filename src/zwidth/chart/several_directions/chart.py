@@ -235,7 +235,7 @@ def _stable_cells(loop: MultiLoop, curves: CurveSet) -> _Cells:
     box = box_of_edges(loop, curves.samples, curves.lines)
     if box is None:
         raster = try_orders(loop, curves.samples)
-        if not raster.differs.any():
+        if not raster.differs.any():  # without cells any box will do
             return _Cells(curves, [], [], WallBox(-np.ones(2), np.ones(2)), raster)
         # no box is known yet: distances between walls are taken in units of k T and b
         curves = curves.with_angles(missed_angles(loop, raster, [], WallBox(np.zeros(2), np.ones(2))))

@@ -230,7 +230,10 @@ class Raster:
 
 
 def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: WallBox) -> Raster:
-    """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and beside their edges."""
+    """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and beside their edges.
+
+    Walls whose largest root is within ON_CIRCLE of the circle, or within ON_EDGE of an edge, do not differ.
+    """
     cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS]
     # a single cell fills the box, whose own grid is enough
     bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
@@ -265,7 +268,8 @@ def try_orders(loop: MultiLoop, samples: Floats) -> Raster:
 
 
 def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygon], box: WallBox) -> Floats:
-    """Angles at which roots cross the circle, on no known edge, on the way from walls that differ; and around."""
+    """Angles at which roots cross the circle, on no edge of the polygons, on the way from walls of a raster that
+    differ to others; and angles around these. None where no wall is of the other verdict."""
     first = np.flatnonzero(raster.differs)
     first = first[:: max(1, len(first) // FROM)]
     # each of these walls with the nearest ones of the other verdict

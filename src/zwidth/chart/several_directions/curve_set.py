@@ -457,7 +457,8 @@ def with_limits(curve: TracedCurve, samples: BranchSamples) -> TracedCurve:
 
 
 def _point_of_limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
-    """The point (1, 3) in which a curve ends beside its point k; None where it goes to infinity."""
+    """The point (1, 3) at the angle `end`, 0 or pi, in which a curve ends beside its point k, 0 or -1; None where
+    it goes to infinity."""
     point, direction = curve.traced.points[k], curve.traced.directions[k]
     with np.errstate(all="ignore"):
         # walls are even in the angle from the end: half the slope times that angle leads from the end to the point

@@ -202,7 +202,8 @@ def _common_wall(
     a: WallCurve, b: WallCurve, start_a: float, start_b: float, size: float
 ) -> tuple[Floats, float, float] | None:
     """Newton for the wall [K T, B] that two curves, or two places of one, share, and its parameters on a and on b;
-    None if it wanders off, or both parameters of one curve begin at one place.
+    None if it wanders off, the tangents are parallel, or both parameters of one curve begin at one place. Where
+    two curves come no closer (see TANGENT) the wall is where the tangents of the step before meet.
 
     start_a, start_b  parameters near it;   size  of the ring
 

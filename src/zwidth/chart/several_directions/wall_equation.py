@@ -212,9 +212,10 @@ def adjugate(W: Matrices) -> Matrices:
 def _common_eigenvalues(A: Complexes, B: Complexes, C: Complexes) -> tuple[Complexes, Complexes]:
     """k and b (N, r^2) at which A + k B + b C and its conjugate are singular, as exact as eigenvalues are.
 
-    Solutions at infinity are eigenvalues as well if combinations of all three Delta are taken. Where A, B or
-    C is 0, nan: without B or C there are lines of walls; C is 0 beside z = -1 behind a low pass, once w is in
-    rounding.
+    Solutions at infinity are eigenvalues as well if combinations of all three Delta are taken: their k and b are
+    quotients by Delta_0 u, which is 0 there but for rounding, and so are huge and mean nothing, inf or nan.
+    Where A, B or C is 0, k and b are nan: without B or C there are lines of walls; C is 0 beside z = -1 behind a
+    low pass, once w is in rounding.
     """
     sized = np.all([np.linalg.norm(X, axis=(1, 2)) > 0.0 for X in (A, B, C)], axis=0)
     if not sized.all():
