@@ -177,7 +177,8 @@ def _length(link: dict[str, Any]) -> float:
 
 
 def with_rigid_links(device: Device) -> Device:
-    """The device with rigid links in place of those that bend, with the same mass."""
+    """The device with rigid links in place of those that bend, with the same mass: the link's own, or that of its
+    beam where the file gives it none."""
     document = copy.deepcopy(device.document)
     for _, link in written(document["mechanism"], "links"):
         section = link.pop("beam", None)
@@ -188,6 +189,7 @@ def with_rigid_links(device: Device) -> Device:
                 "center_of_mass_m": centre.tolist(),
                 "inertia_kg_m2": np.diag(inertia).tolist(),
             }
+    # assembled as the device, which has been checked
     return from_document(document, device.label, skip_assembly_check=True)
 
 
@@ -227,7 +229,8 @@ def _damps_bending(damping: Damping) -> bool:
 
 
 def _tube(mechanism: Mechanism, name: str, link: dict[str, Any], ratio: float) -> Tube | None:
-    """The link of that name in the mechanism as a tube; None if it can be none.
+    """The link of that name in the mechanism as a tube of half its mass, or of that halved until the tube is slim
+    enough and the link's inertia holds it; None where it cannot be a tube.
 
     link   its table in the device file
     ratio  of damping that the tube has in its first vibration, clamped at its base

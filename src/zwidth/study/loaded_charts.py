@@ -170,7 +170,8 @@ class LoadPath(Result):
         return self._columns() | {f"sideways_force_{axis}_N": forces[:, k] for k, axis in enumerate("xyz")}
 
     def _columns(self) -> dict[str, Any]:
-        """Lists of one entry for each push, by key and unit, but for the sideways force."""
+        """Lists of one entry for each push, by key and unit; without the sideways force, a vector. Of several
+        frequencies the lowest."""
         charts = [step.chart for step in self.steps]
         moved = [step.sideways for step in self.steps]
         return {
@@ -297,15 +298,17 @@ class _Pushes:
         except (ChartError, UnresolvedError) as error:
             return PushedChart(push, f"undecided: {error}", equilibrium=found, fixed_surface_status="undecided")
         status = NONE_STABLE if isnan(chart.stiffness_max) else OK
-        surface, why = chart.stiffness_max, status
+        surface, why = chart.stiffness_max, status  # without a push the handle does not sink in: no difference
         if push and status == OK:
             surface, why = self._fixed_surface(device, push, chart.stiffness_max)
         return PushedChart(push, status, chart, found, sideways, _hand_neglected(point, chart), surface, why)
 
     def _fixed_surface(self, device: Device, push: float, near: float) -> tuple[float, str]:
-        """Largest stiffness with surface and hand fixed [N/m], and "ok"; nan, and why there is none.
+        """Largest stiffness with surface and hand fixed [N/m], and "ok"; nan, and why there is none. The handle,
+        from the posture of all charts, then sinks in by push over stiffness, which changes its posture.
 
-        near  the largest stiffness with the posture kept [N/m]
+        device  under this push [N]
+        near    the largest stiffness with the posture kept [N/m]
         """
         axis = screw(self.here.direction)
         if np.any(axis[3:]):

@@ -167,7 +167,7 @@ def _relative_errors(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Fl
     """e of each wall (k, 3) from the edge of a model's chart, as `edge_distance`; where the model's wall at the
     same frequency is near, from points of its exact curve: chords are too coarse for small walls.
 
-    tracer  of the model's loop
+    walls   K, B and frequency of each;   chart  of the model;   tracer  of its loop
     """
     in_radians = 2.0 * pi * chart.loop.period  # angle of a root on the circle, per sample, over its frequency
     ranges = [(float(arc.frequency.min()), float(arc.frequency.max())) for arc in chart.boundary]
@@ -177,6 +177,7 @@ def _relative_errors(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Fl
         for low, high in ranges:
             if not low < frequency < high:
                 continue
+            # of K and B against the model's wall at the same frequency
             error = float(np.max(np.abs(np.array(tracer.wall(in_radians * frequency)[:2]) / wall[:2] - 1.0)))
             if error < NEAR:
                 frequencies = [f for f in frequency * (1.0 + error * CLOSE) if low < f < high]
@@ -221,13 +222,14 @@ class _Edge:
         # frequency [Hz] over the angle of a root on the circle, per sample
         self.hertz = 1.0 / (2.0 * pi * chart.loop.period)
         nyquist = 0.5 / chart.loop.period
+        # arcs of one frequency, as where a root is 1 or -1, are not of the pair curve
         arcs = [arc for arc in chart.boundary if np.ptp(arc.frequency) > 0.0]
         extents = [[np.max(np.abs(arc.stiffness)), np.max(np.abs(arc.damping))] for arc in arcs]
         # K and B that are not negligible (2,)
         self.least = NEGLIGIBLE * np.max(extents, axis=0, initial=0.0) if arcs else np.zeros(2)
         points = [np.column_stack([arc.stiffness, arc.damping, arc.frequency]) for arc in arcs]
         points = [self._within(arc[(arc[:, 2] > 0.0) & (arc[:, 2] < nyquist)]) for arc in points]
-        walls = np.concatenate([np.zeros((0, 3)), *points])
+        walls = np.concatenate([np.zeros((0, 3)), *points])  # (0, 3): the shape where there is no arc
         order = np.argsort(walls[:, 2], kind="stable")
         order = order[_spread_indices(len(order), WALLS)]
         self.frequency, self.walls = walls[order, 2], walls[order]
@@ -256,6 +258,7 @@ def _fit(
 ) -> ModelFit:
     """How one model fits the full one along its edge.
 
+    edge    of the full model;   key, label  as in `ModelFit`;   tolerance  largest error that counts as a fit
     plant   of the model; None: it does not apply, for the reason `reason`
     """
     none = np.empty(0)
@@ -311,8 +314,8 @@ def _runs(good: Flags) -> Iterator[tuple[int, int]]:
 
 
 def _models(full: OperatingPoint) -> Iterator[tuple[str, str, Plant | None, str]]:
-    """Yield key, label, plant and reason of each simpler model: the plant, or None and the reason why there is
-    none. A model that has damping comes once more without it."""
+    """Yield key, label, plant and reason of each simpler model: the plant and "", or None and the reason why there
+    is none. A model that is the full one itself is left out; one that has damping comes once more without it."""
     for key, label in SIMPLER:
         try:
             reduced = full.in_model(key)

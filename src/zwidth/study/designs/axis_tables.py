@@ -53,7 +53,7 @@ def axes_of(
         key = table.get("key")
         if not isinstance(key, str) or not key:
             continue
-        # what a catalogue is of is no number, and its numbers are looked at with it
+        # the key of a catalogue is a name of its own, no number of the file: `_catalogue_axis` checks its numbers
         number_or_circumstance = [] if "catalogue" in table else [key]
         faults = [
             fault
@@ -85,11 +85,11 @@ def _number_axis(
     *,
     bounds: bool,
 ) -> Axis | None:
-    """Return the axis over a number of the device file; None where its key or its values have faults, or it has no
-    values.
+    """Return the axis over a number of the device file; None where `key_faults` finds any in its key or values, or
+    it has no values. With other faults, such as those of a tie, it is returned; `axes_of` leaves it out.
 
     taken   the numbers that other axes set; those of this axis' ties are added
-    faults  that this axis' are added to
+    faults  of this axis; those found here are added
     bounds  as for `axes_of`
     """
     wrong = list(key_faults(device.document, key, _values_with_paths(table), whole_ranges=bounds))
@@ -112,8 +112,9 @@ def unit_of(document: dict[str, Any], key: str) -> str:
 
 
 def _pairing_faults(document: dict[str, Any]) -> Iterator[TableFault]:
-    """Faults of paired axes that have unlike numbers of values."""
-    counts: list[tuple[int, str, int]] = []
+    """Faults of paired axes that have unlike numbers of values; those without `values` or `count`, as of a
+    catalogue, are passed over."""
+    counts: list[tuple[int, str, int]] = []  # number of the axis, the key that says how many, and how many
     for n, table in tables(document, "axis"):
         values, count = table.get("values"), table.get("count")
         many = len(values) if isinstance(values, list) else count if isinstance(count, int) else None
@@ -128,7 +129,11 @@ def _pairing_faults(document: dict[str, Any]) -> Iterator[TableFault]:
 
 
 def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[TableFault]:
-    """Faults of an axis that has no values, gives them twice (range and values), or has a key too many."""
+    """Faults of an axis that has no values, gives them twice (range and values, or a value again), or has a key
+    too many, or one too few; and of a logarithmic range that does not begin above 0.
+
+    sampling  as the study file names it, or SEARCH
+    """
     span, values = table.get("range"), table.get("values")
     if "catalogue" in table:
         for key in ("range", "values", "count", "scale", "tie", "integer"):
@@ -167,7 +172,8 @@ def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[TableFault]
 def _catalogue_axis(
     table: dict[str, Any], key: str, device: Device | None, folder: Path, taken: SetNumbers, faults: TableFaults
 ) -> Axis | None:
-    """The axis of a catalogue; None where it has a fault, which is added to `faults`.
+    """The axis of a catalogue; None where it has a fault, which is added to `faults`, unless `study_schema` or
+    `_values_faults` reports it.
 
     folder  that the catalogue's file lies in
     taken   the numbers that other axes set; those of the catalogue are added
@@ -237,7 +243,8 @@ def _axis_of_table(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, 
 def overlap_faults(
     key: str, where: KeyPath, axis: str, device: Device | None, taken: SetNumbers, kind: str = "axis"
 ) -> Iterator[TableFault]:
-    """Faults of a key that another axis or tie sets too, as a whole or in part, or that excludes such a key.
+    """Faults of a key that another axis or tie sets too, as a whole or in part, or that excludes such a key. A
+    path without a device, and one that the device has not, is passed over.
 
     key    of the axis itself, or of a number tied to it
     axis   key of the axis that sets it
@@ -245,7 +252,9 @@ def overlap_faults(
     taken  what axes before this one set; the key is added
     kind   what messages call an axis
     """
-    steps: KeyPath = ("", key)  # no path of the file: the axis `operator` chooses whose numbers others change
+    # of a circumstance no path of the file: an axis `operator` chooses an operator, and others may change its
+    # numbers
+    steps: KeyPath = ("", key)
     if key not in CIRCUMSTANCES:
         if device is None:
             return
@@ -277,8 +286,10 @@ def _exclude_each_other(one: KeyPath, other: KeyPath) -> bool:
 def key_faults(
     document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]], *, whole_ranges: bool = False
 ) -> Iterator[TableFault]:
-    """Faults of a key that no device file has, or of values of a kind that the schema does not allow there.
+    """Faults of a key that no device file has or that is not a single number or text, or of values of a kind that
+    the schema does not allow there.
 
+    document      of the device
     values        each with its key path in the axis's table
     whole_ranges  whether a number that is whole may have a range
     """
@@ -301,7 +312,7 @@ def key_faults(
         yield (("key",), f"'{key}' is not a single number{hint}")
         return
     if isinstance(now, int | float) and not isinstance(now, bool):
-        kinds &= {*NUMBER}
+        kinds &= {*NUMBER}  # a text does not take the place of a number
     spanned = any(where[0] == "range" for where, _ in values)
     if spanned and not kinds & {*NUMBER}:
         yield (("range",), f"cannot be used: '{key}' takes text; write values = [...] with the texts")
@@ -366,7 +377,7 @@ def ties_of(
         tie: dict[str, Any] = {"key": tied} if isinstance(tied, str) else tied if isinstance(tied, dict) else {}
         to, factor, power = tie.get("key"), tie.get("factor"), tie.get("power")
         if not isinstance(to, str) or not to:
-            continue
+            continue  # `study_schema` reports it
         faults = list(_tie_faults(document, key, to, factor, power, table))
         faults += [] if faults else list(overlap_faults(to, (), key, device, taken, kind))
         faults_of_axes += [(("tie", n, *path), message) for path, message in faults]
@@ -396,7 +407,11 @@ def mirrored(document: dict[str, Any], key: str) -> str | None:
 def _tie_faults(
     document: dict[str, Any], key: str, to: str, factor: Any, power: Any, table: dict[str, Any]
 ) -> Iterator[TableFault]:
-    """Faults of a tie of the number at `to` to the axis at `key`; `table` is that of the axis."""
+    """Faults of a tie of the number at `to` to the axis at `key`.
+
+    document       of the device
+    factor, power  of the tie; None: not given;   table  of the axis
+    """
     try:
         address.resolve(document, to)
         value_in_file = address.get(document, to) if address.exists(document, to) else None
@@ -406,6 +421,8 @@ def _tie_faults(
     if factor is not None and power is not None:
         yield (("factor",), "and power exclude each other; remove one of them")
     elif power is None:
+        # one value of the axis shows whether their kind is allowed at `to`; "key": no range, and only the message
+        # is used, with the tie's number in it
         values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values_with_paths(table)[:1]]
         yield from (
             ((), message.replace(f"'{key}'", f"'{to}'")) for _, message in key_faults(document, to, values)
@@ -451,7 +468,10 @@ def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None)
 
 def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
     """Message: what is wrong with a value of at, direction, assembly, model or operator for a device; "" for
-    nothing."""
+    nothing. An operator's name is not looked up here.
+
+    device  None: only what holds for all devices is checked
+    """
     if key in ("at", "direction"):
         if not isinstance(value, list | tuple) or not all(map(is_number, value)):
             return f"must be 2 or 3 numbers, got {quote(value)}"

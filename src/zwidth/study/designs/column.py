@@ -34,7 +34,7 @@ CONDITIONS: Final = ("isotropy", "isotropy_frobenius", "dynamic_isotropy", "hand
 
 
 def over_the_workspace(dataset: xr.Dataset, name: str, device: Device | None = None) -> dict[str, float]:
-    """Average, worst, best, uniformity and so on of one measure of a map (`measures.overall.Overall`).
+    """Name -> value of the statistics of one measure of a map (`measures.overall.Overall`), such as the average.
 
     Averages are integrals by the trapezoidal rule: points on the rim of the grid stand for half as much. Condition
     numbers have Gosselin and Angeles's `conditioning_index`, and `isotropy` Stocco's `isotropy_index`, for which
@@ -158,7 +158,9 @@ class Column:
         point    gives the operating point of all cells; called where the statistic needs more than the values, as
                  to cut one design's point out of those of many takes longer than to measure it
         weights  area of each cell [m²]; None: all equal
-        Returns  the statistic of the cells that have a value; nan with the commonest status where none has one
+        Returns  the statistic of the cells that have a value; nan with the commonest status where none has one,
+                 with NO_VALUE where some have and the statistic has none, and with FAILED where it cannot be
+                 computed
         """
         assert self.statistic is not None
         try:

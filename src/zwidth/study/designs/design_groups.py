@@ -71,7 +71,7 @@ class DesignGrouping:
         self._documents: dict[tuple[Any, ...], dict[str, Any] | None] = {}
 
     def groups(self, columns: Sequence[DesignColumn]) -> Iterator[DesignGroup]:
-        """The groups of designs; those that cannot be built together with any are in none.
+        """The groups of designs; those of which no batch can be built are in none. Without columns there is none.
 
         columns  all keys that may differ from the document's, or from each other
         """
@@ -82,7 +82,7 @@ class DesignGrouping:
         combinations, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_inverse=True)
         for n, combination in enumerate(combinations):
             rows = np.flatnonzero(group_of.ravel() == n)
-            kind = tuple(
+            kind = tuple(  # key of each column with the name of its values' kind
                 (one.key, names[code]) for one, (_, names), code in zip(columns, kinds, combination, strict=True)
             )
             group = self._group(rows, kind, [one._replace(places=one.places[rows]) for one in columns])
@@ -124,16 +124,17 @@ class DesignGrouping:
     def _group(self, rows: Rows, kind: tuple[Any, ...], taken: list[DesignColumn]) -> DesignGroup | None:
         """The group of the designs `rows`, which all have one kind; None where no batch can be built of them.
 
-        kind   each key with the kind of its values
+        kind   each key with the name of its values' kind (`_kinds`)
         taken  the columns, of these designs alone
         """
         document = self._valid_document(kind, taken, len(rows))
         if document is None:
             return None
-        positions, columns = None, {}
+        positions, columns = None, {}  # columns: resolved path -> numbers (P, ...)
+        # of the first design
         example = {key: values[places[0]] for key, values, places in taken}
         for key, values, places in taken:
-            if key == "at" and isinstance(example["at"], list | tuple):
+            if key == "at" and isinstance(example["at"], list | tuple):  # joint angles have no array
                 positions = np.array(values, dtype=np.float64)[places]
             steps = self._path(key)
             if steps is not None and takes_arrays(steps) and _holds(document, steps):
@@ -148,7 +149,8 @@ class DesignGrouping:
     def _valid_document(
         self, kind: tuple[Any, ...], taken: list[DesignColumn], count: int
     ) -> dict[str, Any] | None:
-        """The document of a valid design of a kind; None where none of the `count` designs of `taken` is valid."""
+        """The document of the first valid design of a kind, kept for all later designs of it; None where none of
+        the `count` designs of `taken` is valid."""
         if self._documents.get(kind) is None:
             for row in range(count):
                 try:

@@ -107,6 +107,7 @@ def check_study(
 ) -> Study | None:
     """The study that a document describes; None where anything is wrong with it, which is added to `faults`.
 
+    label          the study's file, for messages; catalogues lie beside it
     device         with the changes of `set`; None: it could not be loaded, which the caller reports
     operators      as in `Study`
     user_measures  a user's measures by name; None: they could not be loaded, and no measure is looked up
@@ -213,7 +214,7 @@ def _missing_key_faults(document: dict[str, Any], needs: Sequence[str]) -> Itera
 def _measure_columns(
     document: dict[str, Any], user_measures: Mapping[str, Measure], faults: TableFaults
 ) -> tuple[Column, ...]:
-    """The columns whose measures exist; unknown and repeated ones are added to `faults`."""
+    """The columns whose measures exist, repeated ones too; unknown and repeated ones are added to `faults`."""
     names = document.get("measures")
     columns: list[Column] = []
     for n, name in enumerate(names if isinstance(names, list) else []):
@@ -251,6 +252,7 @@ def _check_circumstances(document: dict[str, Any], device: Device | None, faults
             faults.append(((key,), "is an axis as well; remove one of the two"))
         right_type = isinstance(document[key], list if key in ("at", "direction") else str)
         if key in ("at", "direction", "assembly") and right_type and document[key]:
+            # texts among the components are for the schema to report; an assembly has none
             components = document[key] if key != "assembly" else [0.0]
             if all(map(is_number, components)) and (message := circumstance_fault(key, document[key], device)):
                 fault = ((key,), message)
@@ -267,9 +269,10 @@ def plane_of_study(
     spelling: Spelling,
 ) -> PlaneGrid | None:
     """The grid over the workspace, the same for all designs; None where no measure is over it, or anything is
-    wrong, which is added to `faults`.
+    wrong, which is added to `faults` unless it is there already.
 
-    plane  a grid that was given; None: as the document's [workspace] says
+    plane     a grid that was given; None: as the document's [workspace] says
+    spelling  as in `Study`
     """
     names = [column.name for column in columns if column.statistic]
     if not names:
@@ -321,7 +324,8 @@ def _plane_of_document(
 def _task(
     document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults, bounds: bool
 ) -> Task | None:
-    """The task of the study; None without one, or where anything is wrong with it, which is added to `faults`.
+    """The task of the study; None without one, and where it or the circumstances of its reference have faults. Its
+    own faults are added to `faults`, and those of keys that do not go with it, with which it is returned.
 
     bounds  whether the study is read for an optimiser, which has several operators
     """
@@ -342,9 +346,10 @@ def _task(
 
 
 def _check_design_count(checked: StudyFile, hypercube: bool) -> None:
-    """Raise TooLarge for more designs than any computer takes, before any of them is made.
+    """Raise TooLarge for more designs, or more listed values of one axis, than any computer takes, before any is
+    made.
 
-    hypercube  whether they are a Latin hypercube, and not all combinations, or paired axes
+    hypercube  whether they are a Latin hypercube; else they are all combinations, or those of paired axes
 
     Whether fewer fit into memory, or on the disk, depends on where they are kept: `executor.run` and `Store` see.
     """

@@ -255,7 +255,8 @@ def study_over(
     plane: PlaneGrid | None = None,
     user_measures: Mapping[str, Measure] | None = None,
 ) -> Study:
-    """The study of a grid over axes of a device, or of paired axes; see `sweep` for the arguments.
+    """The study of a grid over axes of a device, or of paired axes; see `sweep` for the arguments. A position
+    given by joint angles, which no study file can hold, is set behind the check of the rest.
 
     Raises  DeviceError  with all faults found
             TooLarge     where the designs would not fit into memory
@@ -331,6 +332,7 @@ def _axis_values(axes: Any) -> Iterator[tuple[str, list[Any]]]:
         plain = plain_value(values)
         if isinstance(plain, list) and not plain:
             raise ValueError(f"axes[{key!r}] has no values; give at least one")
+        # a plain list of numbers for `at` is one position, not a list of positions
         if not isinstance(plain, list) or (key in VECTORS and all(map(is_number, plain))):
             raise wrong_type(f"axes[{key!r}]", "a list of values", values, f"write [{plain!r}]")
         yield key, plain
@@ -363,6 +365,7 @@ def _fault_of_argument(path: KeyPath, message: str, keys: list[str]) -> Fault:
     key = keys[int(number)]
     if entry != "key":
         return Fault(argument, key, message)
+    # an argument's name, such as `stiffness`, in place of the key of a study file
     return Fault(
         argument, "", f"'{key}' as an axis is called '{KEYS[key]}'" if key in RENAMED_ARGUMENTS else message
     )

@@ -93,7 +93,7 @@ def sweep_dataset(sweep: Sweep) -> xr.Dataset:
 
 
 def column_attributes(sweep: Sweep, column: int) -> dict[str, str]:
-    """Attributes of a column's variable in a dataset."""
+    """Attributes of the variable of a column, given by its number, in a dataset."""
     one = sweep.job.columns[column]
     return {
         **unit_attributes(one.unit),

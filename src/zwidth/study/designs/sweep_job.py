@@ -136,7 +136,8 @@ class SweepJob:
         )
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Designs first to last - 1: together; alone where a design has no value together, or has to say why."""
+        """Designs first to last - 1: together; alone where a design has no value together, or has to say why. Of
+        each reason the notes count the designs, and name the first."""
         shape = last - first, len(self.columns), self._numbers_per_column
         values, status = np.full(shape, np.nan), np.full(shape, MISSING, dtype=np.uint8)
         reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]  # (status, reason) -> designs
@@ -144,7 +145,7 @@ class SweepJob:
         def fill(row: int, column: int, found: Found) -> None:
             """Put down what was found of a design in a column, and the reason with the design's number."""
             values[row, column], status[row, column], reason = found
-            if reason:
+            if reason:  # of unreduced numbers it belongs to the highest status, as `max` finds it
                 reasons[column].setdefault((int(np.max(found[1])), reason), []).append(first + row)
 
         for group in self._grouping.groups(list(self._design_columns(first, last))):
@@ -197,7 +198,7 @@ class SweepJob:
                     errors.OutOfReach,
                     errors.Singular,
                     errors.BeyondLimit,
-                ) as error:  # of the one mechanism that all of them have
+                ) as error:  # of the one mechanism that all of them have: all valid ones are without a value
                     status = _status_of(error)
                     missed = group.rows[piece][group.valid[piece]]
                     yield from ((int(row), column, (np.nan, status, "")) for row in missed for column in columns)
@@ -230,6 +231,7 @@ class SweepJob:
         (P,), and their points (P,). The others are to be built alone (`point_alone`)."""
         for group in self._grouping.groups(list(self._design_columns(first, last))):
             chosen = {**self.fixed_circumstances, **group.chosen}
+            # joint angles are solved for one design at a time; designs that do not differ have one point alone
             if isinstance(chosen.get("at"), Mapping) or not group.batch.differs:
                 continue
             at = chosen.get("at") if group.positions is None else group.positions
@@ -489,7 +491,11 @@ def sweep_job(study: Study) -> SweepJob:
 
 
 def _check_measures(job: SweepJob, spelling: errors.Spelling) -> None:
-    """Raises MeasureError where a measure exists for none of three designs: the first, the middle and the last."""
+    """Raises MeasureError where a measure exists for none of three designs, the first, the middle and the last, as
+    far as they have an operating point; where none has, nothing is raised.
+
+    spelling  as in `Study`
+    """
     pending, refused = job.columns, dict[str, str]()
     for number in sorted({0, job.count // 2, job.count - 1}):
         design = job.design(number)

@@ -67,8 +67,9 @@ def task_of(document: Mapping[str, Any], device: Device, faults: list[Fault], *,
     """The task that a study's [task] describes; None where anything is wrong with it, which is added to `faults`.
 
     document  of the study; values of the wrong type are left to its schema
-    finer     so many times as many steps between the points of the shape, and directions; the coarser are among
-              them
+    finer     factor on the number of steps between the points of a box, on the rings or shells, and on the
+              directions that are spread. Those of finer = 1 are among them, but for points of a ball, and
+              directions in space
     """
     given = table(dict(document), "task")
     found: list[Fault] = list(_shape_faults(given, device))
@@ -114,19 +115,23 @@ def _shape_faults(given: Mapping[str, Any], device: Device) -> Iterator[Fault]:
 def _positions(
     given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
 ) -> Floats | None:
-    """Positions (n, 3) of the shape's points, or the reference [m]; None without a mechanism, and with faults.
+    """Positions (n, 3) of the shape's points, without a shape the study's `at`, or else the reference [m]; None
+    without a mechanism, and with faults.
 
-    given  the table [task];   document, device, finer  as for `task_of`;   faults  gets what is wrong with it
+    given     the table [task], whose keys fit together (`_shape_faults`)
+    document  of the study
+    faults    gets what is wrong with the positions, by its key path in [task]
+    finer     as for `task_of`
     """
     if device.mechanism is None:
         return None
-    count = given.get("count")
+    count = given.get("count")  # of points or rings; for a box also a list, one of each axis; None: left out
     try:
         if "points_m" in given:
             return np.array([device.position(point) for point in given["points_m"]])
         if "box_m" in given:
             box = given["box_m"]
-            each = [count] * len(box) if not isinstance(count, list) else count
+            each = [count] * len(box) if not isinstance(count, list) else count  # points along each axis
             if len(each) != len(box):
                 faults.append((("count",), f"must be one number, or {len(box)} for the axes of box_m"))
                 return None
@@ -164,7 +169,8 @@ def _coordinates_along(span: Sequence[float], count: int, finer: int) -> Floats:
 
 def _round_points(rings: int, solid: bool) -> Floats:
     """Points (n, 3) of the unit disk, on rings round its centre with 6 points more on each, or of the unit ball,
-    on shells; the outermost lie on its rim. Twice as many rings hold the coarser ones.
+    on shells; the outermost lie on its rim. Twice as many rings hold the points of the fewer; of shells only the
+    centre and the points on the axes are held.
 
     rings  number of rings or shells
     solid  True: of the ball; False: of the disk, in the plane of the first two coordinates
@@ -183,10 +189,12 @@ def _round_points(rings: int, solid: bool) -> Floats:
 def _directions(
     given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
 ) -> Floats | None:
-    """Unit vectors (d, 3) along which walls are rendered, `finer` times as many where they are spread; None: the
-    device's own, or there are faults.
+    """Unit vectors (d, 3) along which walls are rendered; None: the device's own, or there are faults.
 
-    given  the table [task]
+    given     the table [task]
+    document  of the study
+    faults    gets what is wrong with the directions, by its key path in [task]
+    finer     so many times as many, where they are spread
     """
     wanted = given.get("directions")
     if device.mechanism is None or wanted is None:
@@ -215,7 +223,7 @@ def _directions(
 
 def _spread_directions(motions: Floats, first: Floats, count: int) -> Floats:
     """Unit vectors (count, 3) spread over half a circle, or half a sphere: opposite directions have equal walls.
-    Of a handle that moves along a line the one vector (1, 3).
+    Of a handle that moves along a line the one vector (1, 3), whatever the count.
 
     motions  (3, r)  orthonormal, the directions in which the handle can move
     first    (3,)    from whose part in the plane of motion they begin; in space they do not depend on it

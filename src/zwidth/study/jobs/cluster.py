@@ -219,11 +219,13 @@ class _Tasks:
         self._looked = monotonic()  # when the scheduler was last looked at
 
     def finished(self, ranges: Iterable[CellRange]) -> Generator[tuple[CellRange, Batch], None, None]:
-        """Send ranges of cells, and yield each with its batch as it is finished."""
+        """Send ranges of cells, and yield each with its batch as it is finished; with the batch the events that
+        were noted here since the last."""
         coming = iter(ranges)
         self._fill(coming)
         while self.running:
             future = self._next_finished()
+            # range of the future, and how often its workers have ended; -1: not among those sent
             task, lost = self.running.pop(future, ((0, 0), -1))
             if lost < 0:  # none that is still waited for
                 continue
@@ -257,6 +259,7 @@ class _Tasks:
             cluster.time_limit,
             cluster._versions,
             pure=False,
+            # unlike that of the same range sent before, so that dask computes it again
             key=f"zwidth-{cluster._run}-{task[0]}-{secrets.token_hex(4)}",
         )
         self.running[future] = task, lost
@@ -304,7 +307,8 @@ def _job_itself(job: PackedJob) -> PackedJob:
 def _within(seconds: float, call: Callable[[], Any]) -> Any:
     """What a call returns; None where it does not return within `seconds`, or raises.
 
-    A call of dask waits for ever for a scheduler that is there and does nothing; a thread of its own does.
+    A call of dask waits for ever for a scheduler that is there and does nothing; so it is made in a thread, which
+    is left alone after that time.
     """
     found: list[Any] = []
 
@@ -356,7 +360,7 @@ def _versions_reader() -> Callable[[], dict[str, str]]:
 
 
 def _connection_message(address: str) -> str:
-    """Message: why a client cannot talk to a scheduler at this address, and what to do; "" where it answers.
+    """Message: why a client cannot talk to a scheduler at this address, and what to do; "" where one answers.
 
     Asked beforehand, and by a thread that is left alone after a while: a client would wait for ever for a program
     that takes the call and says nothing.

@@ -73,8 +73,9 @@ def run_job(
     """Compute all cells of a job.
 
     A cell that raises an error, or whose process ends again and again, is FAILED, with the reason; the others keep
-    their values. Where all cells raise the same error, at least the first 64, the job has a fault and the error is
-    raised. A process that ends is replaced, its cells are computed again, and a RecoveredWarning says so.
+    their values. Where all cells raise the same error, or the first 64 that are finished, and none was stored
+    before, the job has a fault and the error is raised. A process that ends is replaced, its cells are computed
+    again, and a RecoveredWarning says so.
 
     store       keeps the batches done, by itself or as a folder of that name; those it already holds are not
                 computed again. Large results stay there and are not read into memory
@@ -142,10 +143,14 @@ def _executor_for(
     cluster: str | None,
     executor: Executor | None,
 ) -> tuple[PackedJob | None, Executor | None]:
-    """The packed job and the executor that computes all its cells; None, None: this process begins by itself.
+    """The packed job and the executor that computes all its cells; None, None: this process begins by itself, as
+    neither executor, time limit nor cluster was asked for, or the job cannot be packed and nothing but an executor
+    without a time limit was.
 
     stack     ends an executor that is opened here
     executor  one that was opened before; None: one is opened for a time limit or a cluster
+    Raises    ValueError  for arguments that do not go together, and for a job that cannot be packed and needs
+                          other processes
     """
     if executor is not None and (workers, time_limit, cluster) != (None, None, None):
         raise ValueError("an executor has its own workers, time limit and cluster; give either it or them")
@@ -157,7 +162,7 @@ def _executor_for(
     if (packed := pack_job(job)) is None:  # the job exists in this process only
         if executor is not None and executor.time_limit is None:
             return None, None
-        by = by if executor is None else "time_limit"
+        by = by if executor is None else "time_limit"  # of the executor: without one this process could compute
         raise ValueError(
             f"{by} needs other processes, and a measure of this study exists in this process only; put it in a "
             "file (measures_file)"
@@ -176,7 +181,12 @@ def _cells_per_batch(
     executor: Executor | None,
     packed: PackedJob | None,
 ) -> int:
-    """Number of cells per batch: the store's, the one given, or one measured; a new store is begun with it."""
+    """Number of cells per batch: that of a store begun before; on a GPU GPU_BATCH; the one given; else one
+    measured, or of few cells in memory one so that each slot gets four batches. A new store is begun with it.
+
+    slots             how many batches are computed at once
+    executor, packed  as `_executor_for` returns them
+    """
     if store is not None and store.batch is not None:
         return store.batch
     if processor == "cuda":
@@ -238,6 +248,7 @@ def _collect(
     """Write batches to the store, else into memory, as they are finished; return all cells."""
     total, done = job.count, job.count - plan.left
     memory = None if store is not None else _CellCollection(job)
+    # cells that were stored before have no fault that makes every cell raise
     events, fault = _Events(), _Fault(plan.left if not done else -1)
     if progress is not None:
         progress(stage, done, total)
@@ -321,8 +332,9 @@ class _Fault:
         self.count, self.text = 0, ""  # of the cells held, and of the error that each of them raised
 
     def sift(self, first: int, batch: Batch) -> Iterator[tuple[int, CellValues]]:
-        """Take the batch that begins with a cell; yield first cell and cells of each batch that is held back no
-        more. Raises the error that all cells raised, once these are ENOUGH, or all."""
+        """Take the batch whose first cell has the number `first`; yield first cell and cells of each batch that is
+        held back no more: of all, once one does not raise the same. Raises the error that all cells raised, once
+        these are ENOUGH, or all."""
         self.held.append((first, batch.cells))
         error = batch.error
         if self.left >= 0 and error is not None and (not self.count or str(error) == self.text):
@@ -339,7 +351,8 @@ class _Fault:
 def _compute_here_first(
     job: Job, plan: _Plan, workers: int, patience: float
 ) -> Generator[tuple[CellRange, Batch], None, None]:
-    """Compute the ranges: in this process until `patience` is exceeded, the rest in several processes."""
+    """Compute the ranges: in this process, and from when the rest is estimated to take longer than `patience` [s]
+    in several processes, where `workers`, the largest number of them, is above 1 and the job can be packed."""
     left, measures = plan.left, len(job.measures)
     ranges = plan.ranges()
     for n, (first, last) in enumerate(ranges):
@@ -366,7 +379,9 @@ GOLDEN: Final = 0.6180339887498949
 
 
 def batch_size(compute: Callable[[int, int], object], count: int, slots: int) -> int:
-    """How many cells take about a quarter of a second.
+    """How many cells take about a quarter of a second, at least 1, at most MOST and a share of the job that gives
+    each slot several batches. Where FAILED_TRIALS trials raise, the number that was tried last, within these
+    limits.
 
     Some cells are computed to measure the time, and their values are dropped: cells spread over the job, since the
     first of a study are often its slowest, and growing numbers until they take long enough to tell: many at once
@@ -452,7 +467,7 @@ def open_executor(
 
         with open_executor() as executor:
             for job in jobs:
-                run(job, executor=executor)
+                run_job(job, executor=executor)
 
     workers     largest number of processes; left out: one for each core. A cluster at an address has its own
     cluster     address of a scheduler of dask.distributed, such as "tcp://192.168.1.5:8786"; "local": a cluster of

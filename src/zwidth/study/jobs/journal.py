@@ -82,6 +82,7 @@ class Journal:
         if path.exists() and not path.is_file():
             raise StoreError(f"{path.name or path}: is not an ordinary file; name another")
         data = path.read_bytes() if path.exists() else b""
+        # what follows the last line end was cut short
         lines = _lines_to_keep(path, data.split(b"\n")[:-1], data != b"", question)
         self.known = {entry["name"]: entry["value"] for entry in map(read_checked_line, lines[1:])}
         if (text := b"".join(line + b"\n" for line in lines)) != data:
@@ -89,7 +90,8 @@ class Journal:
         self.entries_read = len(self.known)  # number of results that the file held
 
     def get_or_compute(self, name: str, compute: Callable[[], Any]) -> Any:
-        """The value under this name; if there is none yet, it is computed and written to the journal.
+        """The value under this name; if there is none yet, it is computed and written to the journal's file, if
+        any.
 
         compute  returns what JSON holds: numbers (inf and nan, too), text, lists, dictionaries with text as keys
         """
@@ -105,7 +107,8 @@ class Journal:
 
 
 def _lines_to_keep(path: Path, lines: list[bytes], not_empty: bool, question: str) -> list[bytes]:
-    """The lines of a journal to keep: up to the first damaged one; of another question, a new first line alone.
+    """The lines of a journal to keep: a new first line, and the others up to the first damaged one; of another
+    question none of these. Lines of an older version, which have no checksums, get them.
 
     lines      of the file, without a last one that was cut short
     not_empty  whether the file holds anything, be it a part of a line

@@ -31,7 +31,7 @@ from zwidth.study.jobs.executor import SMALL, Executor, open_executor, run_job
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import FILE as LOCK
-from zwidth.study.jobs.store import FolderLock, Store, kept_for_another, owner_of, whose_work
+from zwidth.study.jobs.store import FolderLock, Store, error_of_kept_folder, owner_of, whose_work
 from zwidth.study.jobs.workers import cores
 
 HEADER: Final = "series.json"
@@ -96,7 +96,8 @@ class JobSeries:
             draft.replace(self.folder / HEADER)
 
     def _is_kept_for(self, identity: dict[str, str]) -> bool:
-        """Whether the folder says that it keeps this question's work. Raises StoreError where it keeps another's.
+        """Whether the folder says that it keeps this question's work. Raises StoreError where it keeps another's,
+        or cannot say whose.
 
         identity  "question" and "study": fingerprints of this question with the release, and without it
 
@@ -119,7 +120,7 @@ class JobSeries:
         if message := unchecked_version_message(header.get("version")):
             raise StoreError(f"{self.folder}: its version {message}; remove it, or name another folder")
         if header.get("question") != identity["question"]:
-            raise kept_for_another(str(self.folder), whose_work(header, identity["study"]))
+            raise error_of_kept_folder(str(self.folder), whose_work(header, identity["study"]))
         return True
 
     def _take_folder(self) -> None:
@@ -131,8 +132,9 @@ class JobSeries:
             raise StoreError(f"{self.folder}: {owner} is computing into it; wait, or name another folder")
 
     def compute(self, name: str, job: Job, stage: str, done: int = 0, of: int | None = None) -> CellValues:
-        """Compute a job, and keep it under a name.
+        """Compute a job, keep its cells in a store of this name in the folder, if there is one, and return them.
 
+        stage     name of it, for the progress
         done, of  cells of the jobs of this stage before it, and of all of them, for the progress; left out: it is
                   the only one
         Raises    what `executor.run_job` and `Store` raise
@@ -151,7 +153,7 @@ class JobSeries:
             except StoreError as error:
                 if error.whose is None:
                     raise
-                raise kept_for_another(str(self.folder), error.whose) from None
+                raise error_of_kept_folder(str(self.folder), error.whose) from None
         began = perf_counter()
         executor = self._executor_in_time()
         slots = 1 if executor is None else executor.slots

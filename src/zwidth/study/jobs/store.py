@@ -55,8 +55,11 @@ PER_CELL: Final = 9  # bytes of value and status; compressed they take less
 UNLIMITED: Final = float("inf")
 
 
-def kept_for_another(folder: str, whose: str) -> StoreError:
-    """The error about a folder with the finished work of another question or release, which is left as it is."""
+def error_of_kept_folder(folder: str, whose: str) -> StoreError:
+    """The error about a folder with the finished work of another question or release, which is left as it is.
+
+    whose  whose work it is, as `whose_work` says it; the error keeps it for callers that name another folder
+    """
     return StoreError(f"{folder}: {whose}; name another folder, or remove it", whose)
 
 
@@ -100,7 +103,9 @@ class Store:
             self._lock.release()
 
     def begin(self, batch: int) -> None:
-        """Begin with batches of this size, where nothing is stored yet. Raises StoreError where something is."""
+        """Begin with batches of this size, where nothing is stored yet: make the store as a draft beside its
+        folder and move it there, so that no half-made one is found. Raises StoreError where it has begun already,
+        and OSError where it cannot be written or another run has just put its own there."""
         import zarr
 
         if self.batch is not None:
@@ -166,7 +171,7 @@ class Store:
 
     def read_batch(self, first: int) -> CellValues:
         """The batch whose first cell has the number `first`. Raises StoreError where it is not there, or is
-        damaged."""
+        damaged, and OSError where it cannot be read."""
         arrays = self._open_arrays()
         assert self.batch is not None
         assert self._notes is not None
@@ -274,7 +279,7 @@ class Store:
         if attributes.get(DIGEST) != _digest_of(attributes) or not isinstance(batch, int):
             raise damaged
         if attributes.get("question") != self.question:
-            raise kept_for_another(self.path.name, whose_work(attributes, self._study))
+            raise error_of_kept_folder(self.path.name, whose_work(attributes, self._study))
         try:
             if attributes.get("descriptions") != _descriptions(self.path):
                 raise damaged
@@ -409,7 +414,7 @@ class FolderLock:
             owner = json.dumps({"process": os.getpid(), "host": socket.gethostname()}).encode()
             os.ftruncate(file, 0)
             os.pwrite(file, owner, 0) if hasattr(os, "pwrite") else os.write(file, owner)
-            self._file, file = file, -1
+            self._file, file = file, -1  # kept open, as closing it would give up the lock
             return True
         finally:
             if file >= 0:
@@ -478,7 +483,7 @@ class NotesFile:
         with open(path, "rb") as file:
             if file.readline() != first:
                 raise ValueError(f"{path.name} begins with another line")
-            self._end = file.tell()
+            self._end = file.tell()  # behind the last whole line: where the next is written
             while (line := file.readline()).endswith(b"\n"):
                 if (entry := read_checked_line(line)).get("name") is not None:
                     self._places[int(entry["name"])] = self._end

@@ -81,11 +81,11 @@ class PackedJob:
 
 
 def pack_job(job: Job) -> PackedJob | None:
-    """The job as bytes to send; None where another process could not read them.
+    """The job as bytes to send; None where another process could not read them, or none can be started.
 
-    That is so for functions typed into a notebook or the main script: they exist in this process only.
+    The first is so for functions typed into a notebook or the main script: they exist in this process only.
     """
-    if not sys.executable:  # Python inside another program
+    if not sys.executable:  # Python inside another program, without one of its own to start
         return None
     try:
         data = pickle.dumps(job)
@@ -117,7 +117,7 @@ class WorkerProcess:
         """Cells first to last - 1 of a job.
 
         Raises  WorkerLost   where the process ended before they were done
-                OutOfTime    where they took longer than the time limit
+                OutOfTime    where they took longer than the time limit, several together TOGETHER longer
                 CannotStart  where no process can be started
                 whatever the job raises
         """
@@ -162,10 +162,11 @@ class WorkerProcess:
             raise
         except Exception as error:
             raise CannotStart(f"a process cannot read the job: {type(error).__name__}: {error}") from error
-        self._jobs = [*self._jobs, job.key][-MOST_JOBS:]
+        self._jobs = [*self._jobs, job.key][-MOST_JOBS:]  # `work` drops older ones in the same order
 
     def _start(self) -> None:
-        """Start the process and wait until it answers. Raises CannotStart after STARTS tries."""
+        """Start the process and wait until it answers. Raises CannotStart where it ends without an answer STARTS
+        times, and at once where the system starts none, or the run was ended."""
         environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
         command = [sys.executable, "-c", START, json.dumps(sys.path)]
         for left in reversed(range(STARTS)):
@@ -234,7 +235,10 @@ class WorkerProcess:
         return reply
 
     def _forget(self, process: subprocess.Popen[bytes], error: Exception) -> str:
-        """Forget a process that answers no more. Returns how it ended, in words."""
+        """Forget a process that answers no more, and end it if it has not ended. Returns how it ended, in words.
+
+        error  that sending to it or reading from it raised
+        """
         code: int | None = None
         with suppress(subprocess.TimeoutExpired):
             code = process.wait(GRACE)
@@ -305,7 +309,7 @@ def work() -> None:
     from zwidth.compile_events import listening
 
     with suppress(AttributeError):
-        signal.signal(signal.SIGIO, signal.SIG_DFL)
+        signal.signal(signal.SIGIO, signal.SIG_DFL)  # ends this process, see `ended_with_its_starter`
     warnings.filterwarnings("ignore", category=RuntimeWarning)  # of arithmetic, hidden as in the command
     received, sent = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # text printed by a user's measure must not mix with the replies
@@ -411,9 +415,10 @@ def compute_on_worker(
 ) -> Batch:
     """Compute cells first to last - 1 of a job, in a process that is kept for the next range of the run.
 
-    run       name of the run, with which `end_processes` ends its processes
-    expected  releases that this worker must have: it may have joined after the others were asked
-    Raises    CannotStart  where it has others, and what `compute_range` raises
+    run         name of the run, with which `end_processes` ends its processes
+    time_limit  s that a cell may take; None: no limit
+    expected    releases that this worker must have: it may have joined after the others were asked
+    Raises      CannotStart  where the run was ended, where it has others, and what `compute_range` raises
     """
     if (releases := versions()) != expected:
         raise CannotStart(f"a worker that joined the cluster has {different(releases, expected)}")
@@ -430,7 +435,7 @@ def compute_on_worker(
         return compute_range(partial(worker.compute, job), job.measures, first, last)
     finally:
         with _lock:
-            ended = run in _ended
+            ended = run in _ended  # meanwhile: the process is not kept
             if not ended:
                 _busy[run].remove(worker)
                 _idle[run].append(worker)
@@ -533,7 +538,8 @@ def _attempt_several_times(
     attempt: Attempt, first: int, last: int, events: list[str]
 ) -> CellValues | tuple[int, str, Exception | None]:
     """Cells first to last - 1, tried several times where their process is lost; or why there are none: status,
-    reason and the error that was raised (None: out of time).
+    reason and the error that was raised (None: out of time). The reason is that of a cell alone: several that fail
+    are cut apart.
 
     events  gets a sentence for each process that was lost
     """

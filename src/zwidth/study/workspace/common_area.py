@@ -119,10 +119,10 @@ def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> Com
     x, y = dataset["x_m"].values, dataset["y_m"].values
     first = requirements[0].measure.name
     outline = reach_outline(dataset, first)
-    if outline is None:
+    if outline is None:  # regions end at the last cells that are reached
         reachable_shape = nonnegative_region(x, y, np.where(reachable(dataset, first), 1.0, np.nan))
         shapes = [nonnegative_region(x, y, r.margin(dataset[r.measure.name].values)) for r in requirements]
-    else:
+    else:  # regions end at the true edge of reach
         reachable_shape = outline
         shapes = [nonnegative_region(x, y, _continued_margin(dataset, r)) & outline for r in requirements]
     common = shapes[0]
@@ -172,14 +172,14 @@ def nonnegative_region(x: Floats, y: Floats, margin: Floats) -> Any:
     import shapely
 
     finite = np.abs(margin[np.isfinite(margin)])
-    # infinities count as twice the largest finite margin
+    # infinities count as twice the largest finite margin; as 1 where none is finite, or all are 0
     most = 2.0 * float(finite.max(initial=0.0)) or 1.0
     clipped = np.ma.masked_invalid(np.clip(margin, -most, most))  # masks nan, which clip keeps
     generator = contourpy.contour_generator(
         x, y, clipped, name="serial", corner_mask=True, fill_type=contourpy.FillType.OuterOffset
     )
-    lines: Any = generator.filled(-ROUNDING * most, 2.0 * most)
-    rings, offsets = lines
+    filled: Any = generator.filled(-ROUNDING * most, 2.0 * most)
+    rings, offsets = filled  # of each polygon the points of all its rings, and where each ring begins and ends
     parts = []
     for points, ends in zip(rings, offsets, strict=True):
         outer, *holes = (points[a:b] for a, b in pairwise(ends))

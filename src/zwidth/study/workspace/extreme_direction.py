@@ -156,6 +156,7 @@ def _extreme_on_circle(search: DirectionSearch, indices: Ints, goal: _Goal, whic
     step = float(np.pi / IN_PLANE)
     angles: Floats = np.asarray(step * np.arange(count), dtype=np.float64)
     costs, status = _sampled(search, indices, _unit_vectors(angles), goal, which)  # (samples, points)
+    # the cost expected at the local minimum beside each sample; inf where the sample is none
     expected, n = _parabola_minimum(costs), np.arange(len(indices))
     k = expected.argmin(axis=0)  # of each point the sample that is refined
     lowest = costs[k, n]
@@ -363,7 +364,7 @@ class DirectionSearch:
     def evaluate_along(self, which: Ints, components: Floats) -> MeasureValues:
         """The measure in points `which` (k,), along directions of these components (k, r) in each one's basis."""
         parts = []
-        for first in range(0, max(1, len(which)), ROWS):
+        for first in range(0, max(1, len(which)), ROWS):  # once for no direction, too, so that there is a part
             rows = slice(first, first + ROWS)
             points = self.point[which[rows]]
             parts.append(evaluate(self.measure, points.towards(self.directions(which[rows], components[rows]))))
@@ -399,7 +400,8 @@ def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tupl
 
 
 def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
-    """Whether the opposite direction has another value, tried at TRIED points along an arbitrary direction."""
+    """Whether the opposite direction has another value, tried at up to TRIED of the points along an arbitrary
+    direction; `basis` (n, 3, r) as in `DirectionSearch`."""
     n, r = len(basis), basis.shape[2]
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
     # a direction at no special angle
@@ -496,6 +498,7 @@ def _share_of_latitude(
     """Share (n,) of a circle, or of half of it if not `whole`, that meets the requirement, at points `indices`.
 
     height  of the circle of latitude on the unit sphere, -1 to 1; 0 in the plane
+    whole   False: opposite directions have equal values, so that half a turn brings all back
     """
     turn, radius = (2.0 * np.pi if whole else np.pi), np.sqrt(1.0 - height * height)
     count = 2 * SAMPLES if whole else SAMPLES

@@ -260,7 +260,7 @@ def map_job(
                     raise error.with_name(one.name) from None
     else:
         device.direction(direction)  # raises what is wrong with it
-    if isinstance(direction, str):
+    if isinstance(direction, str):  # every direction that is compared has the same push
         device = device.pushed_along_every_direction
     if not isinstance(direction, str) and device.renders_moments(direction):
         requested_measures = tuple(one.about_moments() for one in requested_measures)
@@ -281,7 +281,7 @@ def map_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     axes = ("y_m", "x_m")
     column = 0
     for measure in job.requested_measures:
-        width = len(job._columns(measure))
+        width = len(job._columns(measure))  # 1, or 4 with the components of an extreme direction
         unit = measure.unit.replace("^r", f"^{len(mechanism.drives.names)}")  # r: number of drives
         attributes = {
             **unit_attributes(unit),
@@ -399,7 +399,8 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
     """The reachable set within a map's grid, as a shapely geometry in the plane's coordinates.
 
     dataset  a map (`study.workspace.map`);   name  one of its measures
-    Returns  None where the shells do not decide reach, or the map does not hold them
+    Returns  None where the shells do not decide reach, or the map does not hold them; an empty polygon where the
+             plane passes a shell by
     """
     import shapely
 
@@ -439,8 +440,8 @@ def _reach_decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
 
 
 def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
-    """The values (ny, nx) of a map with this status (ny, nx), continued beyond the edge of reach within the range
-    of the others.
+    """The values (ny, nx) of a map with this status (ny, nx), continued by up to LAYERS cells beyond the edge of
+    reach, within the range of the others; as they are where none is finite.
 
     The value of such a cell is extrapolated linearly from the next two cells along each row, column and diagonal
     that has them, and averaged; without two such cells it is the mean of its neighbours. A figure can then be cut

@@ -84,10 +84,10 @@ def plane_of(
     x, y      lowest and highest coordinate along both axes [m]; left out: the file's workspace, or a box around
               what is reached, its ends rounded outwards
     cells     points along both; left out: 81 along the longer side, as many to the metre along the other
-    Raises    WorkspaceError   for parallel axes, an empty range, fewer than two points, a plane that the
-                           reachable set meets in a line or not at all
-              DeviceError  for a device without a mechanism, or a point that is not a position
-              PostureError where the assembly is singular throughout, or does not close
+    Raises    WorkspaceError  for drives that control the orientation, one drive, parallel axes, an empty range,
+                              fewer than two points, a plane that the reachable set meets in a line or not at all
+              DeviceError     for a device without a mechanism, or a point that is not a position
+              PostureError    where the assembly is singular throughout, or does not close
     """
     check_kind("device", device, Device)
     point = device.position(through)
@@ -113,7 +113,7 @@ def plane_of(
     return PlaneGrid(
         first,
         second,
-        (point @ normal) * normal,
+        (point @ normal) * normal,  # of the plane the point nearest to the base frame's origin
         _line_coordinates(*ranges[0], nx),
         _line_coordinates(*ranges[1], ny),
         names,
@@ -172,7 +172,8 @@ def _reach_normal(reach: Floats) -> Floats | None:
 def _plane_axes(
     requested_axes: str | Sequence[float] | None, reach_normal: Floats | None
 ) -> tuple[Floats, Floats, tuple[str, str]]:
-    """Unit vectors (3,) of the plane's axes, and their names. Raises WorkspaceError for axes that are none.
+    """Unit vectors (3,) of the plane's axes, and their names. Raises WorkspaceError for requested axes that are
+    neither a plane's name nor six finite numbers, or that are parallel or of length 0.
 
     requested_axes  as for `plane_of`; None: axes of the base frame in the plane that the handle keeps, or others
     reach_normal    (3,)  of that plane; None where the handle keeps none
@@ -207,6 +208,7 @@ def _plane_axes(
 def _orthonormal(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Unit vectors (3,) along a (3,), and across it towards b (3,). Raises WorkspaceError for a zero or parallel
     vector."""
+    # over the largest component, as squares of very large or small ones leave the range of floating-point numbers
     lengths = [float(np.linalg.norm(v / (np.abs(v).max() or 1.0))) for v in (a, b)]
     if not all(lengths):
         raise WorkspaceError(
@@ -234,12 +236,13 @@ def _check_intersection(normal: Floats, point: Floats, reach_normal: Floats | No
 
     normal, point  (3,)  of the requested plane; the point [m]
     reach_normal   (3,)  normal of the handle's own plane; None where it can leave every plane
+    reach          what the handle reaches
     """
     if reach_normal is None:
         return
     known, k = reach.positions, int(np.argmax(np.abs(reach_normal)))
     # a cosine, to the square of the sine PARALLEL
-    aligned = bool(abs(reach_normal[k]) > 1.0 - PARALLEL**2)
+    aligned = bool(abs(reach_normal[k]) > 1.0 - PARALLEL**2)  # whether the handle's plane lies across base axis k
     plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
     where = (
         f"the plane {'xyz'[k]} = {_coordinate_text(known[0, k])} m"
@@ -261,7 +264,10 @@ def _range_along(
     name: str, given: Sequence[float] | None, axis: Floats, bounds: Floats, reach: ReachableSet
 ) -> tuple[float, float]:
     """Lowest and highest coordinate along a plane's axis (3,) [m]: as given, of the file, or of what is reached.
+    Raises WorkspaceError for a given range that is empty or not finite.
 
+    name    of the axis, for messages
+    given   the range that was asked for; None: none
     bounds  (3, 2)  of the file's workspace along the base frame's axes [m]; nan where it gives none
     """
     if given is not None:
