@@ -87,7 +87,10 @@ def closed_form(states: PlantStates, controller: Controller) -> SampledForm:
 
 def path_responses(plant: Plant, controller: Controller, d: Complexes) -> tuple[Complexes, Complexes]:
     """Responses (...) of the reading, and of the measured force without a hand, 0 without a sensor, to a command
-    in front of the force filter, at z = 1 + d (...): nothing closed but the local loop, and what a load adds."""
+    in front of the force filter, at z = 1 + d (...): nothing closed but the local loop, and what a load adds.
+
+    plant  without an operator
+    """
     sensor = controller.force_sensor
     rows = None if sensor is None else measured_force(plant, sensor)
     states = plant_states(plant, controller.sampling_period, rows, controller.force_filter)
@@ -211,7 +214,7 @@ class _SlowCommand:
 
     def of(self, wall: Floats, reading: Floats, measured: Floats | None) -> Floats:
         """Row (N + 1,) of the command of a sample, from those of the wall's force, the reading and the measured
-        force; None for the last where no sensor's feedback acts."""
+        force; None for the last where it is not measured."""
         command = wall
         if self.sensor is not None and measured is not None:
             known = self.late.push(measured)[-1]  # by the sensor's delay old
@@ -257,7 +260,8 @@ class _Period:
             self.fast = _HeldRows(self.rows, self.local.delay, keeps)
 
     def closed(self) -> SampledForm:
-        """What one period adds to the states, and the reading: the closed plant."""
+        """What one period adds to the states, per state and per newton of the wall's force at its beginning, and
+        the reading: the closed plant. Sets `measured`, and begins the rows anew."""
         wall = self.rows.begin()
         reading = self._reading()
         measured = self._measured_force() if self.measures else None
@@ -281,7 +285,7 @@ class _Period:
             elif event == FAST:
                 fast = fast_later
         N = self.rows.size
-        nothing = np.zeros(N)
+        nothing = np.zeros(N)  # no old force: commands that wait are states
         return SampledForm(
             self.rows.change[:, :N].copy(), self.rows.change[:, N].copy(), nothing, reading[:N], 0.0, 0.0
         )
@@ -475,9 +479,14 @@ def _sensor_zeros(sensor: ForceSensor, period: float) -> list[complex]:
 
 def _section_and_factors(form: PoleZeroForm, delay: int) -> tuple[Floats, Filter]:
     """Poles and zeros two by two: the section (9,), columns of `Sections.rows`, takes the slowest poles, the gain,
-    and a single zero if their number is odd; the filter the others. A delay that stands apart is taken back by
-    zeros."""
-    poles, zeros = form.poles, np.append(form.zeros, np.full(delay, -1.0))
+    and a single zero if their number is odd; the filter the others.
+
+    form   with conjugates one after the other and then the real roots, as `pole_zero_form` gives them: so two in a
+           row always have a real quadratic, and the last root is real where their number is odd
+    delay  [samples] that stands apart as z^-delay (`ClosedSections`). The form has it, too, as poles at z = 0;
+           zeros there are added, which cancel z^-delay
+    """
+    poles, zeros = form.poles, np.append(form.zeros, np.full(delay, -1.0))  # z = 0 is d = -1
     if len(poles) % 2:  # a pole and a zero at z = 0, which change nothing
         poles, zeros = np.append(poles, -1.0), np.append(zeros, -1.0)
     below = _quadratics(poles)
@@ -487,11 +496,12 @@ def _section_and_factors(form: PoleZeroForm, delay: int) -> tuple[Floats, Filter
     top = [1.0, -single[0]] if len(single) else [0.0, 1.0]  # coefficients of d and 1: d - zero, or 1
     # d1, d0, n2 = 0, n1, n0, no old force, not chained
     row = np.array([*slowest[1:], 0.0, form.gain * top[0], form.gain * top[1], 0.0, 0.0, 0.0, 0.0])
-    # each pair of zeros with the pair of poles of the same rank in size, |c0|: no factor is very large or small
+    # each pair of zeros with the pair of poles of the same rank in size, |c0|: no factor is very large or small;
+    # pairs of poles that no zeros are left for have the numerator 1
     below.sort(key=lambda quadratic: -abs(quadratic[2]))
     above.sort(key=lambda quadratic: -abs(quadratic[2]))
     above += [[0.0, 0.0, 1.0]] * (len(below) - len(above))
-    shape = (-1, 3)
+    shape = (-1, 3)  # also of no factors
     return row, Filter(np.array(above).reshape(shape), np.array(below).reshape(shape))
 
 

@@ -48,6 +48,7 @@ def numerator(E: Floats, g: Floats, c: Floats, below: Polynomial) -> Polynomial:
             [value - push * read for value, read in zip(row, reading, strict=True)]
             for row, push in zip(_decimal_rows(E), force, strict=True)
         ]
+        # of E - g c: det(d - E + g c) = det(d - E) + c adj(d - E) g
         top = [a - b for a, b in zip(_determinant(rows), below, strict=True)]
         least = NOTHING * max(map(abs, below))
         while top and abs(top[-1]) <= least:
@@ -92,8 +93,8 @@ def roots_near(p: Polynomial, starts: Complexes) -> Complexes | None:
 
 
 def refined_root(p: Polynomial, start: complex) -> tuple[Decimal, Decimal] | None:
-    """Real and imaginary part of the simple root next to a place, to many digits, by Newton's method; None where
-    it does not settle there."""
+    """Real and imaginary part of the simple root of p next to `start`, to many digits, by Newton's method; None
+    where it does not settle there."""
     with localcontext(ARITHMETIC):
         x, y = Decimal(start.real), Decimal(start.imag)
         for _ in range(12):

@@ -141,7 +141,8 @@ def _numerator(decay: float, squared: float, step: Pair, response: Pair, positio
 def lagged_row(
     decay: float, squared: float, position: float, velocity: float, period: float, fraction: float, lag: float
 ) -> Row:
-    """One second-order mode, whose force lags, as a row in front of the factor 1/(d + s); arguments of `held_row`.
+    """One second-order mode, whose force lags, as a row in front of the factor 1/(d + s); arguments of `held_row`,
+    and period T [s], lag the actuator's time constant [s].
 
     With P the mode's state after T from a unit lagged force without command, Q from a unit command from rest, and
     Q_new from one that has acted for the rest of the interval only, in all of it s = 1 - exp(-T/lag):
@@ -179,7 +180,8 @@ def _lagged_numerator(
 ) -> tuple[float, float, float]:
     """c Q, and the coefficients of d and 1 of  c adj(d - E) [ s_Q P + (s + E) Q ], with the names of `lagged_row`.
 
-    step  as of `_numerator`;   s, s_Q  `lag_share` of a whole interval, and of the time for which Q's command acts
+    Other arguments are those of `lagged_row`;   step  as of `_numerator`
+    s, s_Q  `lag_share` of a whole interval, and of the time for which Q's command acts
     """
     g, dg = step
     x, v = Q
@@ -196,6 +198,8 @@ def _lagged_numerator(
 def lagged_responses(decay: float, squared: float, time: float, lag: float) -> tuple[Pair, Pair]:
     """(Position, velocity) of a mode after `time`: from a unit lagged force without command, and from rest under
     a unit command through the lag.
+
+    decay, squared, lag  as of `lagged_row`;   time  t [s]
 
     The exponential of [position, velocity t, force, command] over times in units of t, by Taylor's series for a
     part of the interval that is then doubled. With the exponential as 1 + X, doubling is X -> 2 X + X^2: nothing

@@ -255,7 +255,7 @@ def has_inertia_share(controller: Controller) -> bool:
 
 
 def with_inertia_of(controller: Controller, rigid_mass: float) -> Controller:
-    """The computer with the share of a rigid mass [kg] as its inertia.
+    """The computer with the share of a rigid mass [kg] as its inertia; itself where it has no such share.
 
     Raises  OperatingPointError  for a device that has no rigid mass
     """
@@ -342,8 +342,8 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
     """The motions that stand apart under a computer that renders no wall, fastest-growing first: as many as are
     free without load, and all that grow.
 
-    plant  the motions that stand apart, with what they are without load. Of the two roots of a coordinate that are
-           real, the larger one counts
+    plant  the motions that stand apart, with what they are without load. A coordinate has one motion, or two where
+           its roots are real; of all of them as many count as there are coordinates, the fastest-growing ones
     """
     form, states = close_plant(plant, controller.wall_alone)
     d = np.linalg.eigvals(form.growth)

@@ -347,7 +347,7 @@ def fill_first(loops: LoopTable, radius: float, out: CircleFactors) -> None:
 @compiled_lean
 def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: Floats) -> None:
     """Fill in `out` (3,), (1 - s)^degree (c2 d^2 + c1 d + c0) in ascending powers of s, degree 1 or 2; with degree
-    1 c2 is 0."""
+    1 c2 is 0. s is that of z = radius (1 + s)/(1 - s), d = z - 1."""
     # (1 - s) d = a0 + a1 s
     a0, a1 = radius - 1.0, radius + 1.0
     if degree == 1:
@@ -362,7 +362,8 @@ def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: F
 
 @compiled_lean
 def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
-    """Fill in the sections of loop i on the circle, and its degree; the computer's factors stand already."""
+    """Fill in the sections of loop i on the circle, and its degree, the number of its poles; the computer's
+    factors stand already."""
     radius, m = out.radius[0], loops.section_count[i]
     # columns of a section's row: d1, d0 of the denominator; n2, n1, n0 of the new force; o2, o1, o0; chained
     for k in range(m):
@@ -381,7 +382,7 @@ def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
 
 @compiled_lean
 def fill_computer(loops: LoopTable, c: int, radius: float, out: CircleFactors) -> None:
-    """Fill in the factors of computer c on the circle |z| = radius."""
+    """Fill in the factors of computer c on the circle |z| = radius, all but the plant's."""
     out.radius[0] = radius
     out.sizes[WHOLE_DELAY], out.sizes[SPLIT], out.sizes[COMPUTER] = loops.whole_delay[c], loops.split[c], c
     out.sizes[FORCE], out.sizes[VELOCITY] = loops.force_count[c], loops.velocity_count[c]

@@ -361,14 +361,14 @@ def set_aside(roots: Complexes, count: int) -> Complexes:
 def _unheld_of_one(loop: Loop) -> int:
     """`unheld_positions` of one direction: those of free motions that its force moves and its sensor reads."""
     plant, local = loop.plant, loop.controller.local_loop
-    if plant.is_loaded or (local is not None and local.stiffness):
+    if plant.is_loaded or (local is not None and local.stiffness):  # these hold the position
         return 0
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     free = shapes[:, squared == 0.0].T
     pushed, read = free @ plant.actuator, free @ plant.sensor
     if not abs(float(pushed @ read)) > MOVED * float(np.linalg.norm(pushed) * np.linalg.norm(read)):
         return 0
-    if loop.closed is not None or loop.sections.sampled_form is not None:
+    if loop.closed is not None or loop.sections.sampled_form is not None:  # one pole at z = 1 for all
         return 1
     # motions of different damping have a row each, d0 = 0 for the pole at z = 1
     return max(1, int(np.count_nonzero(loop.sections.rows[:, 1] == 0.0)))
@@ -531,8 +531,8 @@ def _reach(squared: float, drag: float, period: float, fraction: float) -> float
 def _coupled_modes(
     squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float
 ) -> ContinuousPlant:
-    """States of modes that their damping couples; damped modes that no wall moves are split off by their
-    eigenvectors, unless these are ill conditioned. Arguments as of `_mode_states`."""
+    """States of modes that their damping couples; modes that no wall moves, or no encoder reads, are split off by
+    their eigenvectors, unless these are ill conditioned. Arguments as of `_mode_states`."""
     whole = _mode_states(squared, damping, inputs, outputs, period)
     poles, right = np.linalg.eig(whole.A)
     if np.linalg.cond(right) > DEFECTIVE:

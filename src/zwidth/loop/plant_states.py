@@ -142,8 +142,9 @@ def _modal_states(modes: RealModes, period: float, rows: Floats) -> PlantStates:
     a, squared, T = modes.decay, modes.frequency_squared, period
     # per place and velocity (2, n), the acceleration being -2 a velocity - squared place
     force = np.array([rows[2] - squared * rows[0], rows[1] - 2.0 * a * rows[0]])
-    # what a mode may show unseen: of the reading a share of all modes together; of the force the number of force
-    # per force itself, since a feedback moves poles by what it reads of them (without damping SECOND_UNREAD)
+    # times `level` below, what a mode may show unseen: of the reading a share of all modes together; of the
+    # measured force, which is a force per force, a number (without damping SECOND_UNREAD), since a feedback moves
+    # poles by what it reads of them
     together = np.abs(modes.input).sum() * np.abs(modes.output).sum()
     reach = np.array([together * T**2, SECOND_UNREAD / UNOBSERVED_UNDAMPED])
     kept, hidden, names = [], list[float](), list[str]()

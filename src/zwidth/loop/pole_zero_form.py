@@ -174,7 +174,8 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
 
 
 def separate_rows(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
-    """Rows (m, 8) as of `form_rows`, one for each pair of poles on a subspace of its own, none divided by another.
+    """Rows (m, 8) as of `form_rows`, one for each pair of poles on a subspace of its own, none divided by another;
+    arguments as of `sample_form`.
 
     Where poles lie far apart these keep digits that a long chain loses. Where two pairs are nearly equal they have
     no subspaces of their own: no rows, (0, 8).
@@ -203,7 +204,8 @@ def rows_error(rows: Floats, sampled: SampledForm) -> float:
     Both are compared at ROW_PROBES angles, the last short of pi, where a response may be 0, each in shares of the
     largest response at three neighbouring ones: about a zero of the response rounding is any share of it.
 
-    rows  columns of `loop.sections.Sections.rows`
+    rows     columns of `loop.sections.Sections.rows`
+    sampled  the form that these rows stand for
     """
     k = len(sampled.output)
     if not k:
@@ -245,7 +247,8 @@ def step_growth(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, 
 
 
 def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-    """`step_growth` of r forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and both states (k, r).
+    """`step_growth` of r forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and both states (k, r);
+    dynamics (k, k) A [1/s], time t and lag [s].
 
     One exponential has all: of states, k auxiliary rows, forces and commands. The auxiliary columns hold the
     integral of exp(A t) over the step, in units of t, and A t times that is exp(A t) - 1 without cancellation.
@@ -266,8 +269,8 @@ def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> t
 
 
 def _pairs(poles: Complexes, period: float) -> list[Complexes]:
-    """Poles [1/s] two by two, fast ones first: conjugates together, a real one with its neighbour unless that is
-    much faster than it, and faster than EQUALLY_SLOW allows by as much; an array of one pole then."""
+    """Poles [1/s] two by two, fast ones first: conjugates together, a real one a with the next faster real one b.
+    An array of one pole is left where there is no b, or MUCH_SLOWER |b| is above both |a| and EQUALLY_SLOW / T."""
     pairs = [np.array([value, value.conjugate()]) for value in poles[poles.imag > 0.0]]
     real = list(poles[poles.imag == 0.0][np.argsort(np.abs(poles[poles.imag == 0.0]))])
     while real:
@@ -508,7 +511,8 @@ def _off_axis(roots: Complexes) -> Complexes:
 def _improved(
     system: _Balanced, roots: Complexes, longest: float, poles: Complexes | None, steps: int = STEPS
 ) -> Complexes:
-    """Poles (k,) after some steps of Newton's method, or zeros where `poles` is given. What is 0 stays so.
+    """Poles (k,) after at most `steps` steps of Newton's method, or zeros where `poles` is given. What is 0 stays
+    so.
 
     longest  longest step that is made, in shares of the distance to the next root
     poles    the system's own, to which no zero may jump; None: `roots` are poles

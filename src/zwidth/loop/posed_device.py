@@ -428,8 +428,9 @@ def points_text(shape: tuple[int, ...]) -> str:
 
 
 def point_text(point: OperatingPoint) -> str:
-    """Device, posture, direction, model, operator and computer, as an operating point shows itself; of several
-    designs device, shape and operator alone, of several postures their shape in place of posture and direction."""
+    """Device, posture, direction, model, operator, computer and what a load leaves out, as an operating point
+    shows itself; of several designs device, shape and operator alone, of several postures their shape in place of
+    posture and direction."""
     name = point.name or "a device"
     held = f", held by {point.operator_name or 'an operator'}" if point.operator is not None else ""
     if point.differing:

@@ -107,6 +107,7 @@ def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, es
     whole_delay  samples
     split        whether the fractional part of the delay splits the hold
     force        factors of the force path, of the same degrees in all loops
+    estimator    factors and window of the velocity estimate, likewise
     """
     queue, past_samples = whole_delay + split, estimator.window.shape[-1] - 1
     sizes = (_plant_states(sections), sum(orders(force.denominator)), queue, past_samples)
@@ -168,7 +169,7 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
     """Add two states for each of the rows (..., m, 9), and their weights to the reading (..., N), in place.
 
     In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0). new, old:
-    `_plant_reading`
+    `_plant_reading`; the rows' states are the first of the space.
     """
     before = np.zeros(2)  # input vector through which the row before is driven
     for k in range(rows.shape[-2]):

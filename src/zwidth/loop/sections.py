@@ -69,7 +69,8 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
 
 
 def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float) -> Sections:
-    """Rows of classically damped modes; equal modes are one pair of poles with the sum of their residues."""
+    """Rows of classically damped modes; equal modes are one pair of poles with the sum of their residues.
+    Other arguments as of `sampled_sections`."""
     residue = modes.input * modes.output
     total = float(np.sum(np.abs(modes.input)) * np.sum(np.abs(modes.output)))
     rows, unobserved = [], []
@@ -106,7 +107,7 @@ def equal_modes(modes: RealModes) -> list[list[int]]:
 def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag: float) -> Sections:
     """Rows of the free motion beside a first-order form, and of the form: a chain in doubles, else one in decimal
     arithmetic, else one row for each pair of poles, whichever is nearest to the form's response. Raises
-    UnresolvedError where all are far from it."""
+    UnresolvedError where all are far from it. Other arguments as of `sampled_sections`."""
     free_rows = []
     if form.free_residue:
         row = modal_row(0.0, 0.0, period, fraction, lag)
@@ -144,7 +145,7 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
 
 
 def _repeats(row: Floats, earlier: Floats) -> bool:
-    """Whether a chain's row (8,) has the poles of an earlier one, (k, 8), and adds nothing to it: two equal
+    """Whether a chain's row (8,) has the poles of one of the earlier, (k, 8), and adds nothing to it: two equal
     motions, of which force and sensor see but one.
 
     A row is divided by the earlier one's denominator and its own. That, d^2 + d1 d + d0, is of the size rate^2 at
@@ -166,7 +167,7 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
 
 def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints]:
     """Rows (N, m, 9) of N plants, columns of `Sections.rows`, and how many of each are used (N,): 0 where reach is
-    nan or inf.
+    nan or inf, or the wall moves nothing that the sensor reads.
 
     controller  the same for all plants, or one of N designs for each
     """

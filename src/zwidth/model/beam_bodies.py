@@ -68,8 +68,8 @@ def finite_elements(
     The modes are the lowest of the beam with its base and all stations held (Craig and Bampton 1968). Frequencies
     converge from above, with h^4 of the elements' length h.
 
-    stations  (S,) [m]; a node is put at each. Stations at the base have no coordinates, nor has one that is there
-              twice any more. Without a station at the tip, the tip's motion is among the modes
+    stations  (S,) [m]; a node is put at each. Stations at the base have no coordinates, and one that is given
+              twice has them once. Without a station at the tip, the tip's motion is among the modes
     elements  at least that many, and at least one between stations
     modes     0: static condensation (Guyan 1965); None: no reduction, eps = (displacement and rotation of each
               station, then of each other node from the base on, then of each element how far its middle is along

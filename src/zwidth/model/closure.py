@@ -296,7 +296,7 @@ def step_again(mech: MechanismArrays, work: WorkingMemory, unknowns: int, rows: 
     for j in range(unknowns):
         size = abs(x[0, j])
         # nan counts as the largest
-        if size > most or size != size:
+        if size > most or size != size:  # nan is unlike itself
             most = size
     for j in range(unknowns, mech.joint.size):
         x[0, j] = 0.0
@@ -346,7 +346,8 @@ def orientations(mech: MechanismArrays, work: WorkingMemory) -> tuple[float, flo
 def _add_products(
     start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: int, first_row: int, end_row: int
 ) -> None:
-    """Add start^T rows (see `orientation`) over the equations from first_row to end_row - 1 to G (m, m)."""
+    """Add start^T rows (arguments as of `orientation`) over the equations from first_row to end_row - 1 to G (m,
+    m)."""
     for i in range(unknowns):
         low, high = max(spans[i, 0], first_row), min(spans[i, 1], end_row)
         if low >= high:

@@ -416,7 +416,8 @@ def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: W
     """Move the drives and free joints to their coordinates `independent` (c,) and close the loops, the joint
     coordinates angles (n,) in place. Returned is the loops' reciprocal condition, or NOT_CLOSED.
 
-    Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch.
+    Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch, does
+    not settle, or meets a singularity.
     Links, `rows` and `rates` belong to the closed posture afterwards.
     """
     joint, rates, step, ahead = mech.joint, work.rates, work.solution[0], work.solution[1]

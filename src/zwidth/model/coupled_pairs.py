@@ -120,6 +120,7 @@ def _set_aside_free_motions(M: Floats, B: Floats, K: Floats, ends: Floats, reach
     Each gets a spring of its own instead, and neither input nor output, so that it has no part in the response.
     Where M couples one with other motions, as the mass of an arm that is held by nothing does, it is no motion of
     the plant by itself: reach becomes nan.
+    M, B, K, ends as of `_plant_matrices`, reach (N,) as of `PolePairs`.
     Returns (N,) [1/kg] the sum over these motions of input times output: their response is this over s^2.
     """
     diagonal = np.arange(K.shape[1])
@@ -157,7 +158,7 @@ def _fill_pairs(
     Those whose reach (N,) is not finite are passed over. Where a plant's poles are nearly double or cannot be
     joined (see `_join_poles`), or its parts do not add up to its response, its reach is made nan.
 
-    ends     (2, N, n)  input and output;   poles (N, 2 n)  rough ones, of each plant
+    M, B, K  (N, n, n)  of each plant, ends (2, N, n)  its input and output;   poles (N, 2 n)  its rough poles
     periods  (1,) or (N,)  sampling periods [s]
     """
     n = M.shape[1]
@@ -198,6 +199,7 @@ def _pole_and_residue(
     """The pole that is nearest to `start`, its residue, and whether it is surely a single pole; by inverse
     iteration.
 
+    M, B, K  (n, n)  of Q(p) = M p^2 + B p + K
     ends     (2, n)  input and output;   largest  size of the largest pole
     A, x     (n, n), (n,)  working memory: Q(p) and its eigenvector
     """
@@ -306,7 +308,7 @@ def _join_poles(
 
     False where that cannot be: one part may be rounding or not, or real poles do not come in pairs. Position and
     velocity are 0 of parts of complex poles that the force does not move or the sensor does not read. Residues of
-    real poles are overwritten.
+    real poles are overwritten. decay, squared, position, velocity, reach: of this plant in `PolePairs`.
     """
     parts = 0
     for k in range(count):
@@ -394,7 +396,10 @@ def _agree_with_plant(
 ) -> bool:
     """Whether the parts' responses add up to the plant's at PROBES of the highest frequency [rad/s].
 
-    A, x  working memory"""
+    M, B, K, ends                       (n, n), (2, n)  of one plant; input and output
+    decay, squared, position, velocity  (n,)  its parts, as of `PolePairs`
+    A, x                                (n, n), (n,)  working memory
+    """
     n = len(x)
     for share in PROBES:
         s = complex(0.0, share * highest)

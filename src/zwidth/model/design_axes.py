@@ -71,7 +71,8 @@ def in_one_axis(count: int) -> Change:
 
 
 def _changed(value: Any, change: Change, shape: tuple[int, ...]) -> Any:
-    """A dataclass, or a tuple of such, with the change made to its arrays of designs; any other value itself."""
+    """A dataclass, or a tuple of such, with the change made to its arrays of designs; any other value itself.
+    change, shape: as of `change_designs`."""
     if isinstance(value, tuple):
         return tuple(_changed(one, change, shape) for one in value)
     if not is_dataclass(value) or isinstance(value, type):

@@ -314,7 +314,8 @@ def counted_posture(
     of T. With a drive for each coordinate r is 0. Free joints are taken to stand where they do.
 
     start    motions of the device;   angles (n,)  its joint coordinates
-    ahead    (d,)  by what the counted coordinates are ahead of those of its joints
+    ahead    (d,)  by what the counted coordinates are ahead of those of its joints;   ratio (d,)  as of
+             `drive_travel`
     Returns  None where the joints cannot be there, the drives do not determine where they are, or the search does
              not settle
     """
@@ -434,7 +435,7 @@ def _effective_in_general(
     M, h           (N, c, c), (N, c)  mass matrix of the links, lever arms
     rotor, spring  (N, d)  inertia n^2 J_m and stiffness n^2 k of each drive, at the joint
     spun           (N, d)  n J_m of rotors whose turning with their links counts; None: it does not
-    shape          of the result, of N postures
+    side, shape    the drives' side of these postures; shape of the result, of N in all
     """
     N, c = h.shape
     T = np.broadcast_to(side.motion, (*shape, *side.motion.shape[-2:])).reshape(N, -1, c)

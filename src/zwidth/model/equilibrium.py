@@ -206,8 +206,8 @@ class Balance:
         return torques
 
     def _wrench_of_torques(self) -> Floats:
-        """(6, n): the hand's force and moment that balance generalised forces on the joints (n,), the least that
-        do."""
+        """(6, n): the least force and moment on the handle that act on the joints as generalised forces (n,) do;
+        the hand balances these by its negative."""
         rows = np.zeros((6, self.joints))
         if self.mechanism.controls != ORIENTATION and np.any(self.speed):
             rows[:3] = np.linalg.pinv(self.speed.T)
@@ -343,7 +343,7 @@ class Balance:
         for, the push along the direction less that.
 
         share    of load and gravity that acts
-        ahead    (d,)  deflections;   f  the wall's force [N]
+        ahead    (d,)  deflections;   f  the wall's force [N];   counted  the posture that is counted at these
         torques  (d,)  of the motors, and per_force (d,) their part per newton of the wall's force
         s        (d,)  what each drive hands on to its joint
         """
@@ -489,7 +489,8 @@ def command_change(
 
         dtau = Z G b - T G (Z^T T + T^T Z) G b + T G db,     db/dp = f H - dw/dp
 
-    screw (6,)  the rendered direction;   gravity (3,) [m/s²];   wall_force  f [N]
+    counted     the posture p_c that is counted;   screw (6,)  the rendered direction
+    gravity     (3,) [m/s²], which counts only where its compensation is "computed";   wall_force  f [N]
     """
     k = counted.seen.shape[0]
     T, Z = counted.drives.T[:, :k], counted.drives.Z[:, :k, :k]

@@ -58,9 +58,10 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
     both [m per period].
 
     Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
-    pole at 0 is known exactly. Where motions that are braked only have come to is told by what of it the sensor
-    reads, one state for all of them. Idle vibrations are left out, too, and their poles are hidden ones. Hidden is
-    also a pole that moves the reading within a period T [s] by no more than rounding.
+    pole at 0 is known exactly. Of the places of all motions that are braked but have no stiffness one state is
+    kept, what the sensor reads of them. Idle vibrations, which nothing moves or reads, are left out, too, and
+    their poles are hidden ones. Hidden is also a pole that moves the reading within a period T [s] by no more than
+    rounding.
 
     second_reading  (3, n)  weights of x'', x' and x in a force; a pole is hidden only if it moves this neither. Of
                             motions without springs it must read no place, of those without dampers no velocity
@@ -73,9 +74,9 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
     together = float(np.prod(ends.sum(axis=0)))
     # T^2: a force held for T moves what has the mass 1 by about T^2
     poles, hidden = _poles(A, source, reading, period, together * period**2)
-    inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
-    if abs(inertia) <= UNOBSERVED_UNDAMPED * together:
-        inertia = 0.0
+    free_residue = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
+    if abs(free_residue) <= UNOBSERVED_UNDAMPED * together:
+        free_residue = 0.0
     second, direct = None, 0.0
     if second_reading is not None:
         second = _second_output(A, elastic, damped_or_elastic, len(plant.lagged_dampers), period, second_reading)
@@ -88,7 +89,9 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
     unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
     hidden_poles = np.concatenate([poles[hidden], unread, _poles_of_idle(plant, idle)])
     free_count = int(free.shape[1])
-    return FirstOrderForm(A, source, reading, poles[~hidden], hidden_poles, inertia, free_count, second, direct)
+    return FirstOrderForm(
+        A, source, reading, poles[~hidden], hidden_poles, free_residue, free_count, second, direct
+    )
 
 
 def _second_output(
@@ -183,7 +186,8 @@ def _poles(
     A: Floats, source: Floats, reading: Floats, period: float, alone_gain: float
 ) -> tuple[Complexes, Flags]:
     """All poles (k,) [1/s] of A (k, k), and (k,) which of them are hidden: `source` (k,) does not move them, or
-    `reading` (k,) does not show them, beyond rounding; many fast ones also if it is hardly.
+    `reading` (k,) does not show them, beyond rounding; undamped ones, and of more than MANY poles fast ones, also
+    where that is little.
 
     alone_gain  what a unit force held for T would leave in the reading if no motion held another back [m/N]
 
@@ -339,18 +343,22 @@ def separated_modes(plant: Plant, squared: Floats, shapes: Floats, ends: Floats)
 
 
 def _scaled(matrix: Floats, runs: list[slice]) -> Floats:
-    """A matrix (n, n) on modes, its element i, j over the root of the largest diagonal elements at the frequencies
-    of i and of j: 1 or less of dampers. runs: the modes of each frequency.
+    """A symmetric or skew matrix (n, n) on n modes, in units in which an element above COUPLED couples its modes.
 
-    What does nothing to any by itself is scaled as a whole, so that all of it but its rounding couples.
+    Element i, j is divided by sqrt(s_i s_j), s_i being the largest diagonal element, in size, of all modes that
+    have the frequency of i. Of dampers, a positive semidefinite matrix, what results is 1 at most. Without any
+    diagonal, as of a skew matrix, all elements are divided by one number: those above UNDAMPED of the largest then
+    couple.
+
+    runs  the modes of each frequency; together all n
     """
     sizes = np.ones(len(matrix))
     for run in runs:
         sizes[run] = np.sqrt(np.max(np.abs(np.diag(matrix)[run])))
     if not np.any(sizes):
-        # all above UNDAMPED of the largest then is above COUPLED
+        # UNDAMPED of the largest becomes COUPLED; over 1.0 where all elements are 0
         return np.asarray(matrix / (UNDAMPED / COUPLED * np.max(np.abs(matrix)) or 1.0))
-    sizes[sizes == 0.0] = 1.0
+    sizes[sizes == 0.0] = 1.0  # not divided by 0: there a positive semidefinite matrix has rows of zeros
     return np.asarray(matrix / np.outer(sizes, sizes))
 
 

@@ -159,7 +159,7 @@ def move_joints(mech: MechanismArrays, angles: Floats, step: Floats) -> None:
     """
     joint, kind, column = mech.joint, mech.kind, mech.column
     for u in range(joint.size):
-        if kind[joint[u]] <= PRISMATIC:
+        if kind[joint[u]] <= PRISMATIC:  # all kinds but the three of a ball joint
             angles[joint[u]] += step[u]
     for b in range(mech.balls.size):
         i = mech.balls[b]

@@ -64,7 +64,7 @@ def answered_goal(mech: MechanismArrays, design: int, references: Floats, goal: 
         starts = road.angles[road.nearest_nodes(goal[None], STARTS)[0]]
     descents = [_descend(mech, design, start, goal) for start in starts]
     begin, end, _ = min(descents, key=lambda way: way[2])
-    candidates = end + RETREAT[:, None] * (begin - end)
+    candidates = end + RETREAT[:, None] * (begin - end)  # from the end, at the edge, back into the workspace
     reached = _are_reached(mech, design, references, candidates)
     # a descent weighs turns against shifts and may end far away: the straight way is looked at, too
     reference = handle_goal(mech, design, references[design])
@@ -136,9 +136,10 @@ def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) ->
     begin = handle_goal(mech, design, angles)
     damping, scale = 1e-3, float(mech.size[design]) ** 2
     for _ in range(DESCENTS):
-        missing = gaps[loops:]
+        missing = gaps[loops:]  # of the handle
         motions = _closed_motions(rows[:moved], loops, d) * unit
         J = rows[:moved, loops:].T @ motions
+        # step of the drives, in their units
         turn = np.linalg.solve(J.T @ J + damping * scale * np.eye(d), J.T @ missing)
         largest = float(np.max(np.abs(turn)))
         if largest < SETTLED:
@@ -176,7 +177,8 @@ def _closed_motions(rows: Floats, loops: int, driven: int) -> Floats:
 
 
 def _close_loops(mech: MechanismArrays, design: int, angles: Floats, goal: Floats) -> tuple[Floats, Floats]:
-    """Close the loops with the drives at rest, the angles (n,) in place. Returns `constraints` there."""
+    """Close the loops with the drives at rest, as far as a few steps do, the angles (n,) in place. Returns
+    `constraints` there, with the handle's goal (g,)."""
     passive, loops = mech.joint.size - mech.driven - mech.free, int(mech.first_row[-1])
     rows, gaps = constraints(mech, design, angles, goal)
     for _ in range(8 if passive else 0):

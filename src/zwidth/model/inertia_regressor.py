@@ -130,7 +130,7 @@ def _accelerate_links(
 @compiled_lean
 def _fill_body_regressor(i: int, work: WorkingMemory, flow: LinkAccelerations, out: Floats) -> None:
     """Fill out (c, 10): generalised force of each coordinate per unit of each parameter of link i, in the order of
-    phi."""
+    phi, at the velocities and accelerations in `flow`."""
     R, spin, speed = work.rotation, work.spin, work.speed
     a, w, b = flow.acceleration, flow.angular_velocity, flow.angular_acceleration
     ax, ay, az = _into_link(R, a, i)

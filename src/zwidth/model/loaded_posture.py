@@ -57,7 +57,8 @@ LARGEST_STEP: Final = 0.5  # of Newton's method [rad], [m]
 def loaded_postures(
     mechanism: Mechanism, posture: Posture, screws: Floats, load: Load, counts_motors: bool
 ) -> Posture:
-    """The postures under load of postures (...) without it, one by one; designs broadcast with them.
+    """The postures under load of postures (...) without it, one by one; designs broadcast with them. Those that
+    are not OK stay as they are.
 
     posture  as it is asked for; one that was found under load stands for the one that it was found from
     screws   (..., 6)  rendered directions;   counts_motors  whether encoders are on the motors, or behind the
@@ -99,7 +100,7 @@ def loaded_postures(
 def _loaded_posture(
     mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool
 ) -> Posture:
-    """The posture under load of one design, whose posture without load is given.
+    """The posture under load of one design, whose posture without load is given; arguments of `loaded_postures`.
 
     Raises  EquilibriumError, LoadError  where there is none
     """
@@ -233,7 +234,7 @@ def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
     Raises  EquilibriumError  where none is found, and for a free ball joint that would have to turn
     """
     k, count = len(mechanism.driven), len(mechanism.free)
-    # the same in every posture, so that what is searched for are forces
+    # the same in every posture, so that what is searched for are forces; 1.0 where none acts
     scale = balances.scale(at) or 1.0
 
     def off(there: Posture) -> Floats:
@@ -242,7 +243,7 @@ def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
         return at
-    # without what tells the links of a joint with several coordinates apart
+    # the links of a joint with several coordinates are "name/1", "name/2" and "name"
     names = [mechanism.links.names[i].partition("/")[0] for i in mechanism.free]
     if any(mechanism.links.joint[i] >= BALL_X for i in mechanism.free):
         raise EquilibriumError(
@@ -344,7 +345,7 @@ def _describe(
     position: Floats,
     turn: Floats,
 ) -> None:
-    """Fill in, at joint coordinates (n,), the mass matrix (1, c, c), the handle's Jacobians (1, 3, c), its
+    """Fill in, at joint coordinates angles (n,), the mass matrix (1, c, c), the handle's Jacobians (1, 3, c), its
     position (3,) and its axes `turn` (3, 3)."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
@@ -450,6 +451,7 @@ def _links_stiffness(equilibrium: Equilibrium) -> Floats:
         )
     if equilibrium.compensation != "counterweight":
         K = K + equilibrium.motions.weight(load.weight)[1]
+    # torques on the joints: of the spring, or of the motor where the drive is rigid
     s = np.where(
         np.isfinite(equilibrium.springs.forward),
         equilibrium.springs.torque(equilibrium.deflections),
@@ -511,7 +513,7 @@ def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: 
     the reading:
 
         K_ss - [K_sm 0] [K_mm a_m; c_m^T 0]^-1 [K_ms; 0]      K with what the computer adds, actuator a, sensor c;
-                                                          m: of `moved`, s: of `still`
+                                                          m: of `moved`, s: of `still` (n, s), motions in columns
 
     The second part is of the order of the load's square over the drives' stiffness. So is all that is left of the
     first where the links' half and the computer's cancel. Without springs in `moved` they stay as they are.

@@ -101,7 +101,7 @@ def _fit_windows(
     U: Complexes, Y: Complexes, middles: Ints, width: int
 ) -> tuple[Complexes, Complexes, Complexes, Floats, Floats]:
     """The first five arrays of `Fits` after its width, of windows of `width` spacings to either side of middles
-    (n,): coefficients, factor, cubic, noise and excited."""
+    (n,): coefficients, factor, cubic, noise and excited. U, Y: as of `fit_tiles`."""
     # windows that would begin before the second value, or end beyond the last, are moved inwards
     starts = np.clip(middles - width, 1, len(U) - 1 - 2 * width)
     index = starts[:, None] + np.arange(2 * width + 1)
@@ -195,7 +195,7 @@ def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> Local
     narrowest = fits[0].width
     levels = [_with_floor(one, floor) for one in fits]
     count = len(levels[0].noise)
-    level = np.zeros(count, dtype=np.int64)  # of the window that each of the narrowest tiles goes with
+    level = np.zeros(count, dtype=np.int64)  # number in `fits` of the width that each of the narrowest tiles takes
     whole = np.ones(count, dtype=bool)  # whether a window of the level, and all within it, has not been given up
     for n in range(1, len(levels)):
         apart = _fit_difference(levels[n - 1], levels[n])
@@ -262,7 +262,7 @@ class PieceSums:
     """
 
     def __init__(self, values: int, narrowest: int) -> None:
-        """Begin with sums of no block."""
+        """Begin with sums of no block; arguments as of the class."""
         self._width = narrowest // 2
         # of whole pieces, an even number
         self._count = (values - 1) // self._width // 2 * 2

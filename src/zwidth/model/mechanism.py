@@ -441,8 +441,9 @@ def nonlinear_of_drives(
     links     (d, n)  row i: the coordinate that turns with the link of drive i
     motors    (d, n)  row i: the one that turns with its motor; of a rigid drive the same
     encoders  (d, n)  row i: the one that its encoder counts, either of them
-    bent      (d,)  deflections of the springs under load;   backward  whether one that is not bent is tangent to
-              the other branch; None: no load
+    bent      (d,)  deflections of the springs under load; None: no load
+    backward  whether a spring whose deflection is just at the kink, as without preload one that is not bent, is
+              tangent to the branch behind it
     """
     n, nonlinear = drives.transmission, drives.nonlinearity
     pulled = h != 0.0
@@ -490,8 +491,8 @@ def _counters(drives: Drives, h: Floats, counted: Floats) -> tuple[Counter, ...]
 def _springs(
     drives: Drives, nonlinear: DriveNonlinearity, deflections: Floats, bent: Floats | None, backward: bool
 ) -> tuple[Spring, ...]:
-    """What the drives' springs add to a constant stiffness; deflections (d, n): row i reads theta - phi of drive
-    i, bent and backward as in `nonlinear_of_drives`."""
+    """What the drives' springs add to a constant stiffness, of those that add anything; deflections (d, n): row i
+    reads theta - phi of drive i, bent and backward as in `nonlinear_of_drives`."""
     n = drives.transmission
     cubic = n**4 * nonlinear.hardening
     excess = np.zeros(len(n))

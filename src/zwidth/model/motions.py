@@ -242,10 +242,12 @@ class Motions:
         return force, derivative
 
     def _first_moment(self, link: int, beam: FlexibleLink) -> tuple[Floats, Floats]:
-        """First (3, c) and second derivative (3, c, c) of a beam's mass times the place of its centre."""
+        """First (3, c) and second derivative (3, c, c) of a beam's mass times the place of its centre, by the
+        independent coordinates. link: number of the link that the beam is."""
         base, R, columns = self._links[link], self.rotation[link], self._columns(link)
         M = beam.body.mass
-        # the mass matrix's rows of velocity: m of the speed, m c of the spin, and the elastic coordinates
+        # the mass matrix's rows of velocity: m of the speed, m c of the spin (m c_x in M[1, 5], the beam's axis
+        # being x), and the elastic coordinates
         mass = M[0, 0]
         straight = base.at(R @ np.array([M[1, 5], 0.0, 0.0]) / mass)
         bent = np.zeros_like(base.speed)

@@ -62,7 +62,8 @@ def attach(plant: Plant, operator: Operator, across: Floats | None = None) -> Pl
     """The plant with an operator at its handle.
 
     across   (k, n)  other motions of the handle by which he holds it in the same way; None: none
-    Returns  Plant; an elastic grasp adds the arm as the last coordinate, a rigid one adds none
+    Returns  Plant; an elastic grasp adds the arm as the last coordinate, and one more for each of `across`, a
+             rigid one adds none
     Raises   OperatorError  for a plant without a handle, or an elastic grasp of an arm without mass
 
     >>> one = np.ones(1)

@@ -277,7 +277,8 @@ class Plant:
     apart: Plant | None = None
 
     def __post_init__(self) -> None:
-        """Make lists arrays. Raise ValueError for shapes that do not go together."""
+        """Make lists arrays. Raise ValueError for shapes that do not go together, of all but handle, hysteresis
+        and hand force."""
         for name in ("mass", "damping", "stiffness", "actuator", "sensor", "handle", "hysteresis", "hand_force"):
             value = getattr(self, name)
             if value is not None and not isinstance(value, np.ndarray):

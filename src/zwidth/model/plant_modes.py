@@ -32,10 +32,10 @@ STILL = 1e-14  # share of the largest damping below which a mode's own is roundi
 def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
     """The modes of each of N designs of a plant, in the form of those of a mechanism's postures.
 
-    designs  shape of the designs, where their plants are all the same
+    designs  shape with which that of the plant's own designs broadcasts; the result is flat, of N designs
     Returns  with `drag`, and as coupled also two modes of one frequency or two free motions with damping; nan as
-             input where a plant has to be computed by itself, in another way: dampers that lag, a loss factor,
-             masses that are not positive
+             handle where the plant has none, and as input where a plant has to be computed by itself, in another
+             way: dampers that lag, a loss factor, masses that are not positive
     """
     shape = np.broadcast_shapes(design_shape(plant), designs)
     N, n = int(np.prod(shape)), plant.size
@@ -214,7 +214,8 @@ def modes_in_general(
     """The modes of each posture's full model, flat; nan as input where a posture is not OK or the drives cannot
     move the handle along its direction.
 
-    direction  (..., 3) or (..., 6), as for `rendered_modes.rendered_modes`
+    mechanism  one for which `has_general_modes` says so
+    direction  (..., 3) or (..., 6), and all else as for `rendered_modes.rendered_modes`
     """
     side, mechanism = drive_side(mechanism, posture), at_postures(mechanism, posture)
     flat = _flat_postures(mechanism, posture, side, screw(direction))
@@ -239,7 +240,8 @@ def modes_in_general(
 
 
 def _flat_postures(mechanism: Mechanism, posture: Posture, side: DriveSide, u: Floats) -> Postures:
-    """Postures, drives' side and screws u (..., 6), broadcast with the designs and flattened to N."""
+    """Postures, drives' side and screws u (..., 6), broadcast with the designs and flattened to N. Which drives
+    are flexible is read off the first: it is the same in all designs (`has_general_modes`)."""
     drives = mechanism.drives
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1], mechanism.design_shape)
     design, known = design_of_each(mechanism, shape), np.broadcast_to(posture.status == OK, shape).ravel()

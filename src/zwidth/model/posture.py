@@ -232,7 +232,7 @@ def _project_goals(
     solved: PostureBatch,
     tolerance: float | None,
 ) -> tuple[Floats, Floats | None]:
-    """Replace goals (N, g) out of reach, and their postures, by those of goals near them that the handle can have.
+    """Replace goals (N, g) out of reach, and their postures `solved`, in place by near ones that can be had.
 
     design     (N,)  of each goal;   reference  (P, n)  joint coordinates of each design [rad], [m]
     tolerance  how far a goal may be projected, as a share of the arm's length; None: no goal is projected
@@ -396,8 +396,8 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, rates: ArrayLike) -> F
     flat = np.broadcast_to(given, (*shape, independent)).reshape(-1, independent)
     design = design_of_each(mechanism, shape)
     out = np.empty(flat.shape)
-    still = np.zeros(3)
-    bias_batch(mech, design, np.array(angles, order="C"), np.array(flat, order="C"), still, out)
+    no_gravity = np.zeros(3)
+    bias_batch(mech, design, np.array(angles, order="C"), np.array(flat, order="C"), no_gravity, out)
     return out.reshape(*shape, independent)
 
 
@@ -568,7 +568,7 @@ def _limit_text(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, 
     link = _joint_beyond(mech, angles, goal[None].copy())
     if link < 0:  # the straight way does not lead there
         return "a joint is beyond its limits; ask for a place nearer to the reference, or widen the limits"
-    name = mechanism.links.names[link].partition("/")[0]  # one for all coordinates of a joint
+    name = mechanism.links.names[link].partition("/")[0]  # links of one joint: "name/1", "name/2", "name"
     value, low, high = angles[link], float(mech.lower[0, link]), float(mech.upper[0, link])
     unit = "m" if mech.kind[link] == PRISMATIC else "rad"
     drive = _drive_with_table(mechanism, link)

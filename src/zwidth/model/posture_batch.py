@@ -274,11 +274,11 @@ def shells(mech: MechanismArrays, design: int | Ints) -> list[Shell]:
 
 
 def _shared_points(mech: MechanismArrays, design: int | Ints) -> list[SharedPoint]:
-    """Points that two links share, in the frame of each: at joints that do not slide, and at closures; design as
-    of `shells`."""
-    tip = np.zeros_like(mech.handle[design, 0])
+    """Points that two links share, in the frame of each: at joints that do not slide, the origin of the second
+    link, and at closures; design as of `shells`."""
+    own_origin = np.zeros_like(mech.handle[design, 0])
     joints = [
-        (int(mech.parent[i]), mech.origin[design, i], i, tip)
+        (int(mech.parent[i]), mech.origin[design, i], i, own_origin)
         for i in range(len(mech.parent))
         if mech.kind[i] != PRISMATIC
     ]

@@ -262,7 +262,8 @@ def _hidden_by_steps(
     follow the force, and under noise the motion at other frequencies; slow motion, slower than 1/4 of the
     frequency, does not, nor what the steps themselves may make, q^2 / 4.
 
-    step q [m];  f (n,) frequencies in those of sampling;  samples  of a transform
+    force  its size over all blocks;   step q [m];   f (n,) frequencies in those of sampling
+    samples  of a transform
     local  the response of the differenced position, and gain (n,) = |z - 1|^m
     """
     if step == 0.0:
@@ -340,9 +341,11 @@ def _common_step(differences: Floats, least: float) -> float:
     changed = differences[differences > least]
     if not len(changed):
         return 0.0
+    # at first the smallest change, then the median of what changes of not too many steps make it
     step = float(np.min(changed))
     near = changed[changed < NEAR * step]
     step = float(np.median(near / np.rint(near / step)))
+    # of many steps the step's own error would hide whether they are whole
     shares = changed[changed < CLOSE * step] / step
     multiples = np.rint(shares)
     whole = np.abs(shares - multiples) < WHOLE

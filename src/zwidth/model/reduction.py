@@ -135,7 +135,8 @@ def links_and_drives(mechanism: Mechanism, posture: Posture, screws: Floats) -> 
 
 
 def check_moves_along(posture: Posture, side: DriveSide, h: Floats, u: Floats) -> None:
-    """Raise DirectionError where the drives cannot move the handle along a screw u of lever arms h."""
+    """Raise DirectionError where the drives cannot move the handle along a screw u (6,) of lever arms h (c,), of
+    which those of the drives come first."""
     reach = float(np.linalg.norm(posture.jacobian)) if np.any(u[:3]) else 0.0
     if np.any(u[3:]):
         reach = max(reach, float(np.linalg.norm(posture.angular_jacobian) * np.linalg.norm(u[3:])))
@@ -162,7 +163,7 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
 
     Sensor, lagged dampers and nonlinear parts are moved by these motions: W^T sensor, W^T along.
 
-    Returns  Plant; `full` gives the plant itself, and so does the model it already is
+    Returns  Plant; `full` gives the plant itself, as do `two-mass` of two masses and `rigid` of one
     Raises   ModelError  where the model does not apply, with the reason; for hysteresis all but `full`
     """
     check_kind("plant", plant, Plant)
@@ -235,6 +236,7 @@ def _full(
     ones.
 
     link_mass (c, c), h (c,)  mass matrix of the links, lever arms, in the independent coordinates
+    damping, encoders         as of `reduce_mechanism`;   side  the drives' side
     """
     drives = mechanism.drives
     M, K, D, flexible = full_matrices(drives, side, link_mass)
@@ -390,7 +392,8 @@ def _rigid(mass: float, damping: float) -> Plant:
 
 
 def _is_two_mass(plant: Plant) -> bool:
-    """Whether the plant is a link side and a motor side joined by a spring, in this order."""
+    """Whether the plant is a link side and a motor side joined by a spring, in this order; whatever its
+    dampers."""
     if plant.size != 2 or plant.handle is None:
         return False
     k = plant.stiffness[0, 0]
@@ -506,7 +509,7 @@ def _with_handle(reduced: Plant, plant: Plant, motion: Floats) -> Plant:
 def _with_sensor(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
     """The reduced plant with its sensor: where the wall acts, where the hand is, or what the motions move it by.
 
-    Raises  ModelError  where that is not known, or nothing
+    Raises  ModelError  where that is not known, or the sensor reads nothing
     """
     if np.array_equal(plant.sensor, plant.actuator):
         return reduced

@@ -76,6 +76,7 @@ def rendered_modes(
 
     posture    (...), flattened to N; the designs of the mechanism broadcast with it
     direction  (..., 3)  unit vectors, or (..., 6) screws (`effective_mass.screw`)
+    damping, encoders  as of `reduction.reduce_mechanism`
     Returns    nan as input where there are no such modes: given dampers that couple them, windings closed through
                resistors, rigid drives in a model that needs flexible ones
     """
@@ -145,6 +146,7 @@ def _modes_of_reduced(numbers: EffectiveParameters, model: Model, coefficients: 
 
     The two masses' own ratio is that of their mode; the motor mass keeps the damper of the pair (`reduction`).
 
+    numbers       effective masses and stiffness of N postures
     coefficients  (N, 3)  r_m [1/s], r_k [s] and damping ratio of each posture
     """
     r_m, r_k, ratio = coefficients.T
@@ -217,6 +219,7 @@ def _full_modes(
     `enter` where no number comes out. A design with rigid drives has fewer modes than others: the rest are 0.
 
     mass (N, d, d), along (N, d)  of the links, lever arms;   rotors, springs (P, d)  at the joints of each design
+    at_motor   whether the encoders read the motors;   enter, leave  participations of force and of reading
     """
     d, most = along.shape[1], squared.shape[1] - 1
     M, inverse, h, shape = np.empty((d, d)), np.empty((d, d)), np.empty(d), np.empty(d)

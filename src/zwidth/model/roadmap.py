@@ -266,12 +266,12 @@ def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> 
             digit = (cell_of[head] // place_value) % turns
             revolves = mech.kind[mech.joint[mech.joint.size - mech.free - mech.driven + drive]] == REVOLUTE
             for sign in (-1, 1):
-                # the cell's number has one digit to the base `turns` for each drive; a turn beyond the last comes
-                # back to 0
                 # of a drive that slides digits above half of `turns` lie backwards: from one half it does not go
                 # on to the other
                 if not revolves and digit == (turns // 2 if sign > 0 else (turns // 2 + 1) % turns):
                     continue
+                # the cell's number has one digit to the base `turns` for each drive; a turn beyond the last comes
+                # back to 0
                 cell = cell_of[head] + ((digit + sign) % turns - digit) * place_value
                 if visited[cell]:
                     continue

@@ -116,6 +116,8 @@ def _difference_quotient(angle: Floats) -> Complexes:
 def _factor_phase(row: Floats, angle: Floats) -> Floats:
     """Continuous phase of c2 d^2 + c1 d + c0 from theta = 0, less the right angle of the differentiator's i.
 
+    row  (3,)  c2, c1, c0, roots within or on the unit circle;   angle  (...)  theta
+
     A root r within the unit circle turns the phase by theta + arg(1 - r/z), whose second part stays within a right
     angle of 0, so that one principal value gives two of them. At r = 1 (d = 0) and r = -1 (d = -2) it is
     theta/2; these are divided out first, for at the ends of the range nothing is left to take a phase of.

@@ -84,6 +84,8 @@ def _weights(n: int, order: int, centred: bool) -> tuple[float, ...]:
     (m + 1) t_{m+1}(k) = (2 m + 1)(2 k - n + 1) t_m(k) - m (n^2 - m^2) t_{m-1}(k),      t_0 = 1
 
     The values are whole numbers. The slopes t_m'(s) follow the same recursion, differentiated.
+
+    n, order, centred  samples, order and centred of `SavitzkyGolay`, which has c_k, t_m, s and h_m
     """
     n, order = int(n), int(order)  # NumPy's whole numbers would overflow
     place = Fraction(n - 1, 2) if centred else Fraction(0)

@@ -61,7 +61,8 @@ def held_response(response: Response, operator: Operator, period: float) -> Resp
 
 def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Response:
     """The response with an operator at the handle, of a device whose port is known already, at the frequencies at
-    which errors leave something of it. Raises OperatorError for an arm without mass behind an elastic grasp."""
+    which errors leave something of it, or at all of them where these are too few. Raises OperatorError for an arm
+    without mass behind an elastic grasp."""
     _check_mass(operator)
     D = operator_stiffness(operator, port.theta / port.period)
     beyond = _aliases(port, operator)
@@ -126,7 +127,8 @@ def _check_mass(operator: Operator) -> None:
 
 
 def _note(response: Response, port: MeasuredPort, share: Floats, kept: Flags) -> str:
-    """How the held response was made, in words. share: of the aliases in it (n,)."""
+    """How the held response was made, in words. share (n,) of the aliases in it; kept (n,) which frequencies stay
+    in it."""
     below = kept & (port.theta < ALIKE * np.pi)
     worst = int(np.argmax(np.where(below, share, 0.0)))
     parts = [response.note] if response.note else []
@@ -155,8 +157,8 @@ def _hand_change(base: Mapping[str, Complexes], D: Complexes) -> Complexes:
 
 
 def _aliases(port: MeasuredPort, operator: Operator) -> Complexes:
-    """Sum (n,) of X over the frequencies theta + 2 pi k, k other than 0, to FAR on either side, of the fitted
-    modes."""
+    """Sum (n,) of X, what the hand takes off the response, over the frequencies theta + 2 pi k, k other than 0, to
+    FAR on either side, of the fitted modes."""
 
     def change(theta: Floats) -> Complexes:
         """X (...) [m/N] of the fitted modes at angles (...) of any size, in radians per sample."""
@@ -179,7 +181,7 @@ def _aliases(port: MeasuredPort, operator: Operator) -> Complexes:
 def _relative_error(
     port: MeasuredPort, D: Complexes, change: Complexes, held: Complexes, beyond: Complexes
 ) -> Floats:
-    """Relative standard deviation (n,) of a held response; 0 where no error of the paths is known.
+    """Relative standard deviation (n,) of a held response of a port; 0 where no error of the paths is known.
 
     change, held, beyond  (n,) X, the held response, and the aliases in it;   D  (n,) [N/m] of the hand
 

@@ -203,8 +203,8 @@ def changed_port(port: MeasuredPort, added_delay: float = 0.0, period: float | N
 
 
 def sweep_port(port: MeasuredPort, number: int) -> MeasuredPort:
-    """The device as it was in one of its repeated sweeps, number from 0, the error of which is not known."""
-    base, value = port.sweeps[number]  # its four paths before sampling, and the sampled "sa"
+    """The device as it was in one of its repeated sweeps, number from 0, the error of which is not known: 0."""
+    base, value = port.sweeps[number]  # its paths before sampling, and the sampled "sa"
     beyond = {name: port.sampled[name] - port.baseband[name] for name in port.sampled}
     return replace(
         port,

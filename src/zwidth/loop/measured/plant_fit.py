@@ -112,7 +112,8 @@ class PlantFit(Documented):
 
 
 def fit_plant(response: Response, period: float) -> PlantFit:
-    """The plant of a measured device; its misfits are those below 0.95 of half the sampling rate.
+    """The plant of a measured device; its misfits are those below 0.95 of half the sampling rate. A handle whose
+    paths are not known is left out.
 
     period  sampling period T [s]
     Raises  ResponseError  where no plant explains the response
@@ -155,6 +156,7 @@ def fit_plant(response: Response, period: float) -> PlantFit:
 def _first_model(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) -> ModalModel:
     """The model of these poles, with residues of the paths by least squares and dampers that couple no modes.
 
+    data, found      the measured paths, and the poles that `fit_poles` finds in them
     at_sensor, tied  whether the handle, and the actuator, is where the sensor is
     """
     poles, delay, residues = found.modes, found.delay, {}
@@ -230,8 +232,8 @@ def _fitted(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool)
 def _model_of_numbers(
     data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool, x: Floats
 ) -> ModalModel:
-    """Return the model of the numbers x (q,) that are fitted, laid out as by `_numbers_of_model`; the rest is that
-    of the start."""
+    """Return the model of the numbers x (q,) that are fitted, laid out as by `_numbers_of_model`, which has the
+    same arguments; the rest is that of the start, and an end that is where the sensor is has its numbers."""
     n, first = len(start.squared), int(start.free)
     m = n - first
     rows, columns = np.tril_indices(m)
@@ -261,7 +263,7 @@ def _model_of_numbers(
 def _numbers_of_model(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> Floats:
     """Return the numbers (q,) of the start that are fitted, per sample: logarithms of the modes' frequencies (0 of
     one without spring), the lower triangle of the damping's factor, the sensor, and as far as they are free
-    actuator, handle and delay."""
+    actuator, handle and delay. Arguments as of `_fitted`."""
     first = int(start.free)
     rows, columns = np.tril_indices(len(start.squared) - first)
     springless = start.squared[first:] == 0.0

@@ -141,6 +141,7 @@ def _search(data: PathData) -> tuple[float, float, Floats]:
     best, misses = kept[0], 0
     while best[0] > EXACT and len(kept[0][2]) < MOST_MODES and misses < 2:
         kept = _until_exact(data, [(_with_a_mode(data, modes, delay), delay) for _, delay, modes in kept])
+        # with one mode only all starts stay: it does not tell yet which of them is best
         kept = sorted(kept, key=lambda one: one[0])[: KEPT if len(kept[0][2]) > 1 else None]
         misses = 0 if kept[0][0] < GAIN * best[0] else misses + 1
         best = kept[0] if misses == 0 else best
@@ -205,8 +206,9 @@ def stacked(values: Complexes, deviation: Floats) -> Floats:
 
 
 def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats, Floats]]:
-    """Of each path, in the order of the data: an orthonormal basis (2k, r) of its atoms, and what they leave (2k,)
-    of its values, both weighted and `stacked`."""
+    """Of each path, in the order of the data, with modes (n, 2) as of `PoleModel` and a delay [samples]: an
+    orthonormal basis (2k, r) of its atoms, and what they leave (2k,) of its values, both weighted and
+    `stacked`."""
     parts = []
     inputs = {name[1]: name for name in data.values}  # any path from each input: atoms hang on it alone
     of_input = {letter: _path_atoms(data, name, modes, delay) for letter, name in inputs.items()}
@@ -272,7 +274,8 @@ def _delay_deviation(data: PathData, modes: Floats, delay: float, misfit: float)
 
 
 def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
-    """The modes (n + 1, 2) with the one more that takes most of what the n modes leave of the data."""
+    """The modes (n + 1, 2) with the one more that takes most of what the n modes leave of the data, at a delay
+    [samples] that stays."""
     parts = _projected(data, modes, delay)
     k = len(data.theta)
     # power per angle that is left, at whose peaks modes are tried beside a grid of angles
