@@ -91,8 +91,8 @@ def simulate_contact(
                        The same run is then made without it, too
     duration           simulated time [s]; None: a tenfold change at the predicted rate and at least eight periods,
                        at most 60 s; 2 s and more where something is not linear (see `run_length`)
-    substeps           integration steps per sample, where the device or the environment is not linear; at most 20 of
-                       a linear device under a steady push, which is exact with any
+    substeps           integration steps per sample, where the device or the environment is not linear; at most 20
+                       of a linear device under a steady push, which is exact with any
     seed               of the encoders' noise
     trail              keep the handle's position after each substep
     seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]
