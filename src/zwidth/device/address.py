@@ -87,10 +87,10 @@ def in_schema(path: str) -> bool:
 
 
 def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    """A copy of the document with one value set (`UNSET`: removed); exclusive keys are dropped.
+    """A copy of the document with one value set (`UNSET`: removed), and without the keys that exclude it.
 
-    A table of kinds whose keys of the other kind are dropped, or a new one, gets the `type` that the key belongs
-    to; a velocity that gets another `method` keeps of its keys those that the method reads.
+    Where a table may be of several kinds, as a filter, its `type` becomes the kind that has this key, if keys of
+    another kind went or it had no type; a velocity that gets another `method` keeps the keys that this reads.
 
     Raises DeviceError  if the schema has no such path, or a list no such element
     """

@@ -238,7 +238,8 @@ def _name_column(ax: Axes, column: Any) -> None:
 
 
 def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
-    """Name the x or y axis, `which`, by the key of a coordinate in SI units; of texts, number it by them."""
+    """Label the axis `which`, "x" or "y", with key and unit of a coordinate (a DataArray), and set its ticks and
+    its scale: logarithmic where the coordinate is said to be; of texts, a tick for each."""
     axis = ax.xaxis if which == "x" else ax.yaxis
     key = str(coordinate.attrs.get("long_name", coordinate.name))
     if coordinate.dtype.kind not in "if":
