@@ -74,6 +74,7 @@ class MachineCode(_Cache):
     def save_overload(self, signature: Any, result: CompileResult) -> None:
         """Write a compiled kernel to disk; where no folder may be written to, it serves this process only."""
         folder = written_folder()
+        # dynamic globals are addresses of this process, as of objects that the code holds
         if folder is None or result.library.has_dynamic_globals:
             return
         if not Path(self._function.__code__.co_filename).is_file():  # typed at a prompt: no other process has it

@@ -331,7 +331,10 @@ def copy_pieces_near(
 @compiled_apart
 def fits_about(close: EdgeNodes, K: float, factor: float, damping_factor: float, middle: float) -> bool:
     """`fits` for the one gap round the damping `middle`, by the pieces close to it alone; False, too, where one of
-    them reaches `middle`, with the gap as it was. Else the gap goes into `close.gap`."""
+    them reaches `middle`, with the gap as it was. Else the gap goes into `close.gap`.
+
+    middle  in the gap that `fits` found last, whose walls were seen to be stable: that is not asked again
+    """
     low, high, below, above = K / factor, K * factor, 0.0, np.inf
     for i in range(close.used[0] - 1):
         if close.piece[i] == NO_PIECE:

@@ -340,9 +340,10 @@ def _spectra_of_part(
 def _predicted(
     name: str, point: OperatingPoint, wall: tuple[float, float] | None, frequency: Floats
 ) -> Complexes | None:
-    """Impedance (k,) that `felt` predicts in a state of the wall [N s/m]; None where the device has no model or no
+    """Impedance (k,) [N s/m] that `felt` predicts in a state of the wall; None where the device has no model or no
     handle, or where the wall is not known.
 
+    name  of the state, one of STATES: "off", the device is free and `wall` is not used
     wall  stiffness [N/m] and damping [N s/m]; None: not known
     """
     from zwidth.errors import FeedbackError, HandleError

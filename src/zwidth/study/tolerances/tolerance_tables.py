@@ -361,8 +361,10 @@ def _obstacle_in_words(one: Obstacle, path: str) -> str:
 
 
 def _fault_in_words(fault: Fault, path: str) -> str:
-    """A fault without the advice that it gives about a single device; "it" for the number at the path in full."""
-    first = fault.message.split("; ")[0]
+    """A fault's key and message, without the advice that it gives about a single device; "it" in place of the key
+    where that is `path`, a dotted path in full."""
+    first = fault.message.split("; ")[0]  # behind which stands the advice
+    # cut within a bracket, which goes, too
     if first.count("(") > first.count(")"):
         first = first[: first.rindex(" (")]
     return f"{'it' if fault.key == path else fault.key} {first}"
