@@ -153,7 +153,7 @@ class TimeResponse(Result):
 
     @property
     def series(self) -> dict[str, Floats]:
-        """The records of each sample, by key and unit; energies where they were recorded."""
+        """The records of each sample, by key and unit, with the stored energy where it was recorded."""
         return dict(super().table())
 
     def __repr__(self) -> str:

@@ -80,7 +80,7 @@ def characteristic_length(
     """
     J = np.asarray(jacobian, dtype=np.float64)
     power = _powers(J, rotations, prismatic)
-    _check_single_minimum(J, power)
+    _check_single_minimum(power)
     unknown: Flags = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     J = np.where(unknown[..., None, None], np.eye(*J.shape[-2:]), J)
     values = np.linalg.svd(J, compute_uv=False)
@@ -137,8 +137,9 @@ def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Fl
     return power
 
 
-def _check_single_minimum(J: Floats, power: Floats) -> None:
-    """Raise ValueError where the length has no effect, or where the minimum may not be unique."""
+def _check_single_minimum(power: Floats) -> None:
+    """Raise ValueError where the length has no effect, or where the least condition number may not be the only
+    one, by the powers (m, n) of the length in the entries."""
     m, n = power.shape
     rows, columns = bool(np.ptp(power[:, 0])), bool(np.ptp(power[0]))
     if not rows and not columns:

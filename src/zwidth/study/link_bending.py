@@ -221,8 +221,8 @@ def typical_tubes(device: Device) -> tuple[Tube, ...]:
 
 
 def _damps_bending(damping: Damping) -> bool:
-    """Whether a file's damping damps all flexible modes, those of links among them; False for one of the drives
-    alone."""
+    """Whether a file's damping damps all flexible modes, those of links among them, by its stiffness; False for
+    one of the drives alone, and for one by the mass, which damps fast modes ever less."""
     if isinstance(damping, ModalDamping):
         return float(damping.ratio) > 0.0
     return isinstance(damping, ProportionalDamping) and float(damping.stiffness_coefficient_s) > 0.0

@@ -177,8 +177,8 @@ class BoundaryParameters:
 
 def _bounds(numbers: DeviceNumbers, i: int) -> tuple[float, float]:
     """Bounds of the i-th number as the vector has it, by which values the file allows: the start itself to a side
-    on which a small step is refused; else WIDEST away or the file's limit, and of a number that is not positive
-    infinite. Raises DeviceError for a number that cannot be varied alone."""
+    on which a small step is refused; else, of a positive number, WIDEST away or the file's limit if nearer;
+    else -inf or inf. Raises DeviceError for a number that cannot be varied alone."""
     vector = numbers.vector(numbers.start)
     start = float(vector[i])
 
